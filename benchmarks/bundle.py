@@ -3,7 +3,7 @@
 Every program gets the same arrays and the same start in the same process, one thread each, one after the other in each
 round; times are those of the processor, medians of the rounds. Without the two packages only our own times are printed.
 
-Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block corridor] [--largest N] [--alone]
+Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block] [--largest N] [--alone]
 """
 
 from __future__ import annotations
@@ -63,7 +63,6 @@ CASES = {
     "large": STRIPS[-1:],
     "block": [Case(20, 50, 40)],
 }
-LONG = [Case(1, photos, 40) for photos in (1000, 3000, 10_000)]
 
 
 def problem(case: Case) -> BundleProblem:
@@ -189,36 +188,11 @@ def _print_ratios(ratios: Sequence[tuple[Case, Times]]) -> None:
 # --------------------------------------------------------------------------------------------- growth
 
 
-def corridor(cases: Iterable[Case], rounds: int) -> None:
-    """Print how time grows with the length of a strip."""
-    lines: list[tuple[str, ...]] = []
-    shortest = 0.0
-    for case in cases:
-        given = problem(case)
-        solve(given)
-        own, more = np.median([timed(given)[:2] for _ in range(rounds)], axis=0).tolist()
-        per = 1e6 * own / len(given.images)
-        shortest = per if not lines else shortest
-        lines.append(
-            (
-                case.title,
-                str(len(given.images)),
-                f"{1000.0 * own:.0f}",
-                f"{1000.0 * more:.0f}",
-                f"{per:.2f}",
-                f"{per / shortest:.2f}",
-            )
-        )
-    print("long corridors: milliseconds, and microseconds for each ray")
-    table(("photos", "rays", "solve", "covariances", "per ray", "to the first"), lines)
-
-
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=5, help="rounds of which medians are taken")
-    names = [*CASES, "corridor"]
-    parser.add_argument("--cases", nargs="*", choices=names, default=names, help="which tables to print")
+    parser.add_argument("--cases", nargs="*", choices=CASES, default=[*CASES], help="which tables to print")
     parser.add_argument("--largest", type=int, default=100_000, help="photos of the largest strip to adjust")
     parser.add_argument("--alone", action="store_true", help="without the other programs")
     wanted = parser.parse_args()
@@ -229,8 +203,6 @@ def main() -> None:
         if name in wanted.cases:
             fitting = [case for case in cases if case.photos <= wanted.largest]
             side_by_side(fitting, wanted.rounds, alone=alone)
-    if "corridor" in wanted.cases:
-        corridor([case for case in LONG if case.photos <= wanted.largest], wanted.rounds)
     sys.stdout.flush()
     if peers.KEPT:
         os._exit(0)  # what two libraries own together cannot be freed

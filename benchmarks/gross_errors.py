@@ -193,13 +193,8 @@ class Run:
 
     def sound(self, wrong: Iterable[str]) -> Floats:
         """Errors of the points without a wrong measurement of their own."""
-        spoiled = spoiled_points(wrong)
+        spoiled = {name.partition("/")[2] for name in wrong}
         return self.errors[[name not in spoiled for name in self.point]]
-
-
-def spoiled_points(wrong: Iterable[str]) -> set[str]:
-    """Points with a wrong measurement."""
-    return {name.partition("/")[2] for name in wrong}
 
 
 def adjusted(project: Project, settings: Settings) -> Run:

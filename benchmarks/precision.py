@@ -4,7 +4,7 @@ One geometry, its image coordinates and control drawn anew many times. Printed i
 divided by the scatter, rms over all points, to the east, to the north and up; then the same of the photos' centres and
 rotations, and the smallest and largest ratio of any single coordinate of a point.
 
-Usage: python benchmarks/precision.py [--repetitions N] [--workers N] [--only NAME ...]
+Usage: python benchmarks/precision.py [--repetitions N] [--workers N]
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import argparse
 import sys
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
-from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -204,14 +203,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repetitions", type=int, default=2000)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--only", nargs="*", help="words of the names of the strips wanted")
     wanted = parser.parse_args()
-    # one worker needs no other process
-    with get_context("spawn").Pool(wanted.workers) if wanted.workers > 1 else ThreadPool(1) as pool:
+    with get_context("spawn").Pool(wanted.workers) as pool:
         print(f"{'strip':24} {'method':13} {'points: along, across, up':19} {'photos: centre, rotation':44} single")
         for case in SCATTER:
-            if not wanted.only or any(word in case.name for word in wanted.only):
-                scatter(pool, case, wanted.repetitions)
+            scatter(pool, case, wanted.repetitions)
 
 
 if __name__ == "__main__":

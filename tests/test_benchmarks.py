@@ -50,15 +50,6 @@ def test_bundle_prints_times_and_ratios() -> None:
     assert len(re.findall(r"^\d+ x \d+ +- +- +- +\d\.\d\d of 1\.00 +(?:yes|no)$", out, re.MULTILINE)) == 2
 
 
-def test_bundle_prints_growth(capsys: pytest.CaptureFixture[str]) -> None:
-    from benchmarks.bundle import Case, corridor  # limits the threads of the process
-
-    corridor([Case(1, 10, 40), Case(1, 20, 40)], 1)
-    out = capsys.readouterr().out
-    assert re.search(r"^10 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +1\.00$", out, re.MULTILINE)
-    assert re.search(r"^20 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +\d\.\d\d$", out, re.MULTILINE)
-
-
 @pytest.mark.slow
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
