@@ -27,15 +27,15 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # before numpy is imported, also in the processes that are started here
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-from photostrip.geodesy.tying import tie_frames  # noqa: E402
-from photostrip.geometry.rotation import from_vector  # noqa: E402
-from photostrip.pipeline.run import triangulate  # noqa: E402
-from photostrip.simulation.simulation import simulate  # noqa: E402
-from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.strip.polynomial import correction, terms  # noqa: E402
-from tests.simulated import inputs_of, settings_of  # noqa: E402
+from photostrip.geodesy.tying import tie_frames
+from photostrip.geometry.rotation import from_vector
+from photostrip.pipeline.run import triangulate
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec
+from photostrip.strip import polynomial, polynomial_terms
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -177,7 +177,7 @@ def run(task: Task) -> Outcome:
         wanted = replace(
             settings,
             adjustment="similarity" if simple else "polynomial",
-            polynomial=correction.PolynomialSettings(AUTO if simple else choice),
+            polynomial=polynomial.PolynomialSettings(AUTO if simple else choice),
         )
         result = triangulate(inputs, wanted)
         squares[choice] = mean_squares(simulation, result, result.points.cartesian)
@@ -203,7 +203,7 @@ def _degrees(result: Result) -> tuple[int, int]:
     found = result.strips[0].polynomial
     if found is None:
         return 0, 0
-    plan, _, height = ([terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    plan, _, height = ([polynomial_terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
     return max(plan, default=0), max(height, default=0)
 
 

@@ -59,8 +59,8 @@ class Peer:
 def available() -> bool:
     """Say whether pyceres and pycolmap are installed."""
     try:
-        import pyceres  # noqa: F401
-        import pycolmap.cost_functions  # noqa: F401
+        import pyceres
+        import pycolmap.cost_functions
     except ImportError:
         return False
     return True

@@ -34,30 +34,31 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # as the command does, before numpy is imported
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-from photostrip.formats.output.result_json import read_result  # noqa: E402
-from photostrip.formats.output.simulation import project_files  # noqa: E402
-from photostrip.formats.text.writing import write_files  # noqa: E402
-from photostrip.library.result import Result  # noqa: E402
-from photostrip.pipeline.plausibility import gate  # noqa: E402
-from photostrip.pipeline.precision import photo_precision  # noqa: E402
-from photostrip.pipeline.run import triangulate  # noqa: E402
-from photostrip.project.loading import load_project  # noqa: E402
-from photostrip.report.page import console  # noqa: E402
-from photostrip.report.sections.accuracy_report import chosen_sections, title_of  # noqa: E402
-from photostrip.result.document import document_of  # noqa: E402
-from photostrip.simulation.simulation import simulate  # noqa: E402
-from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402
-from photostrip.strip import absolute_orientation  # noqa: E402
-from photostrip.strip.gross_errors.control import control_screening  # noqa: E402
-from photostrip.strip.gross_errors.pairs import screening  # noqa: E402
-from photostrip.strip.image_coordinates import corrections  # noqa: E402
-from photostrip.strip.polynomial import correction  # noqa: E402
-from photostrip.strip.relative_orientation.orientation import orient_pairs  # noqa: E402
-from photostrip.strip.relative_orientation.pairs import collect_pairs  # noqa: E402
-from photostrip.strip.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
-from tests.simulated import inputs_of  # noqa: E402
+from photostrip.formats.output.result_json import read_result
+from photostrip.formats.output.simulation import project_files
+from photostrip.formats.text.writing import write_files
+from photostrip.library.result import Result
+from photostrip.pipeline import precision
+from photostrip.pipeline.plausibility import gate
+from photostrip.pipeline.run import triangulate
+from photostrip.project.loading import load_project
+from photostrip.report.page import console
+from photostrip.report.sections.accuracy_report import chosen_sections, title_of
+from photostrip.result.document import document_of
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec
+from photostrip.strip import (
+    absolute_orientation,
+    polynomial,
+)
+from photostrip.strip.gross_errors import control_screening, pair_screening
+from photostrip.strip.image_coordinates import corrections
+from photostrip.strip.relative_orientation.orientation import orient_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.relative_orientation.solution import iterate_elements, start_values
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -221,7 +222,7 @@ class Stopwatch:
 
     def _timed(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
-        def timed(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401 (whatever the function takes and gives)
+        def timed(*arguments: Any, **named: Any) -> Any:
             if self.inside:  # the time belongs to the stage that calls
                 return function(*arguments, **named)
             self.inside = True
@@ -239,24 +240,24 @@ pipeline = import_module("photostrip.pipeline.run")  # the module; the package g
 of_strips = import_module("photostrip.pipeline.strips.photos")
 on_control = import_module("photostrip.pipeline.strips.photos_on_control")
 common = import_module("photostrip.pipeline.common_points")
-screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
-strip_network = import_module("photostrip.network.gross_errors.strip_network")
+screened_formation = import_module("photostrip.pipeline.strips.photos")
+strip_network = import_module("photostrip.network.strip_rays")
 STAGES = (
     ("image coordinates", corrections, "refine"),
     ("collecting pairs", of_strips, "collect_pairs"),
     ("relative orientation", of_strips, "orient_unchecked"),
-    ("screening of pairs", screening, "screen_pairs"),
+    ("screening of pairs", pair_screening, "screen_pairs"),
     ("strip formation", of_strips, "form_from_pairs"),
     ("strip formation", screened_formation, "form_from_pairs"),
     ("screening of the strip", strip_network, "wrong_rays"),
     ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
-    ("polynomial", correction, "fit"),
+    ("polynomial", polynomial, "fit"),
     ("resection", on_control, "resect"),
     ("points of all strips", common, "_joined"),
     ("differences at given points", pipeline, "compare_with_given"),
     ("points without coordinates", pipeline, "not_determined"),
-    ("standard deviations", photo_precision, "of_photos"),
+    ("standard deviations", precision, "of_photos"),
     ("search for mistakes", gate, "of_result"),
 )
 WHOLE = "triangulate"

@@ -58,7 +58,7 @@ def test_the_linter_knows_the_same_fences() -> None:
     ("file", "text", "found"),
     [
         ("geodesy/crs.py", "from pyproj import CRS", False),
-        ("geodesy/curvature.py", "from pyproj import CRS", True),
+        ("geodesy/local_frame.py", "from pyproj import CRS", True),
         ("pipeline.py", "def f():\n    import yaml", True),
         ("report/page/text.py", "import rich.table", True),
         ("report/page/console.py", "import rich.table", False),

@@ -60,7 +60,7 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
     match kind:
         case "model":
             from photostrip.formats.output.plans.model import model_document
-            from photostrip.planning.model.plan import given_errors, plan_model
+            from photostrip.planning.model_plan import given_errors, plan_model
             from photostrip.project.plans.model import load_model_plan
 
             model = load_model_plan(path, assignments)

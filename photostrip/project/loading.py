@@ -241,7 +241,7 @@ def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenLis
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
     """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
-    from photostrip.pipeline.plausibility import image_evidence  # a project without faults is examined as a whole
+    from photostrip.pipeline.plausibility import image_evidence
 
     root, measured = reading.root, tables.observations
     given = valid_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)})

@@ -16,8 +16,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
-from photostrip.strip import absolute_orientation
-from photostrip.strip.polynomial import correction
+from photostrip.strip import absolute_orientation, polynomial
 from tests.loops import nonempty
 from tests.results import write_project
 from tests.simulated import inputs_of, settings_of
@@ -42,7 +41,7 @@ PLANE_MAP = replace(
 
 
 def degree(asked: str) -> Settings:
-    return Settings(adjustment="polynomial", polynomial=correction.PolynomialSettings(asked))
+    return Settings(adjustment="polynomial", polynomial=polynomial.PolynomialSettings(asked))
 
 
 def errors(simulation: Simulation, result: Result) -> Floats:
@@ -143,19 +142,19 @@ def east_west_strip() -> tuple[Simulation, StripResult, Result]:
     xy = inputs.observations.xy
     radius = np.hypot(*xy.T)[:, None]
     bad = replace(inputs, observations=replace(inputs.observations, xy=xy * (1 + 2e-8 * radius**2)))  # 20 um at 100 mm
-    result = triangulate(bad, replace(SIMILARITY, polynomial=correction.PolynomialSettings("3")))
+    result = triangulate(bad, replace(SIMILARITY, polynomial=polynomial.PolynomialSettings("3")))
     return done, result.strips[0], result
 
 
-def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Floats, correction.Polynomial]:
+def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Floats, polynomial.Polynomial]:
     """Fit a cubic in a frame with its X axis in some azimuth; points come back in the Cartesian frame."""
     frame = strip.intermediate.with_azimuth(azimuth)
     xyz = frame.intermediate_from_cartesian(strip.cartesian)
     targets = absolute_orientation.Targets(strip.control, result.frames, frame)
     weight = absolute_orientation.weights(strip.control, strip.precision)
     breadth = float(np.quantile(np.abs(xyz[:, 1]), 0.95))
-    problem = correction.FitProblem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
-    found = correction.fit(problem, correction.PolynomialSettings("3"))
+    problem = polynomial.FitProblem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
+    found = polynomial.fit(problem, polynomial.PolynomialSettings("3"))
     return frame.cartesian_from_intermediate(found(xyz)), found
 
 

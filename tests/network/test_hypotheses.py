@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.network import hypotheses
-from photostrip.network.gross_errors import snooping
+from photostrip.network import hypotheses, snooping
+from photostrip.network.adjustment import Selection, solve, supported
 from photostrip.network.hypotheses import (
     DECENTRED,
     DISTANCE,
@@ -28,17 +28,15 @@ from photostrip.network.hypotheses import (
     most_likely,
 )
 from photostrip.network.problem import PositionObservations
-from photostrip.network.selection import Selection, supported
 from photostrip.network.settings import BundleSettings
-from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.loops import nonempty
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
+    from photostrip.network.adjustment import BundleSolution
     from photostrip.network.hypotheses import Hypothesis
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution
 
 
 def with_positions_and_lists() -> BundleProblem:

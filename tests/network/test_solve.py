@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.rotation import from_vector
+from photostrip.network.adjustment import IterationStep, _still_to_come, solve
 from photostrip.network.problem import (
     BundleCameras,
     BundleProblem,
@@ -21,8 +22,6 @@ from photostrip.network.problem import (
     PositionObservations,
     StartValues,
 )
-from photostrip.network.solution import IterationStep
-from photostrip.network.solve import _still_to_come, solve
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Image, Points, Spec, simulate
 from tests.attitudes import angle_between
@@ -350,7 +349,7 @@ def test_steps_without_end_say_what_is_wrong_with_the_control(
         along = np.outer(middle @ axis, axis)
         xyz = xyz.mean(axis=0) + along + breadth * (middle - along)
     xyz[0, 0] += off
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=words) as caught:
         solve(replace(problem, control=replace(problem.control, xyz=xyz)))
     assert caught.value.code == "bundle-diverged"
@@ -358,7 +357,7 @@ def test_steps_without_end_say_what_is_wrong_with_the_control(
 
 def test_steps_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = simulated(6, 1)
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=r"did not converge in 1 step$") as caught:
         solve(problem)
     assert caught.value.code == "bundle-diverged"

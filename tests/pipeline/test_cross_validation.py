@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.network.gross_errors import snooping
-from photostrip.network.solve import solve
+from photostrip.network import snooping
+from photostrip.network.adjustment import solve
+from photostrip.pipeline import precision
 from photostrip.pipeline.cross_validation import FOLDS
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.precision import check_points
-from photostrip.pipeline.strips import forming
+from photostrip.pipeline.strips import method
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models
-from photostrip.strip.gross_errors.control import control_screening
+from photostrip.strip.gross_errors import control_screening
 from tests.loops import nonempty
 from tests.results import solved, spec
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
+    from photostrip.network.adjustment import BundleSolution
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution
-    from photostrip.strip.gross_errors.control.control_deletion import Columns, JointAdjustment
+    from photostrip.strip.gross_errors.control_search import Columns, JointAdjustment
 
 ADJUSTMENTS = ("similarity", "polynomial", "bundle")
 TURNED = Settings(cross_validation=True)
@@ -87,7 +87,7 @@ def test_the_strips_are_formed_once_and_the_adjustments_are_bounded(monkeypatch:
         formed.append(given)
         return form_strip(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(forming, "form_strip", counted)
+    monkeypatch.setattr(method, "form_strip", counted)
     document = solved(without_checks(bands=5), TURNED).document
     folds = document["cross_validation"]["folds"]
     assert len(formed) == 1
@@ -196,7 +196,7 @@ def test_control_that_the_whole_rejected_is_not_searched_for_again(
 def test_points_that_are_too_many_to_be_tested_together_have_standard_deviations(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(check_points, "MOST_TESTED", 1)
+    monkeypatch.setattr(precision, "MOST_TESTED", 1)
     document = solved(without_checks(bands=5), replace(TURNED, adjustment="polynomial")).document
     points = document["cross_validation"]["points"]
     assert len(points) > FOLDS

@@ -13,7 +13,7 @@ from photostrip.pipeline.image_coordinates import heights_of, orient_interior
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import simulate
-from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
+from photostrip.strip.image_coordinates.corrections import ImageCorrectionSettings
 from tests.geodesy.frames import write_gtx
 from tests.results import spec
 from tests.simulated import inputs_of

@@ -7,7 +7,7 @@ import pytest
 from photostrip.network.hypotheses import DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER
 from photostrip.network.reliability import CONTROL, IMAGE, POSITION
 from photostrip.plausibility import KINDS
-from photostrip.plausibility.causes import CAUSES
+from photostrip.plausibility.finding import CAUSES
 from photostrip.result.description import described
 from tests.codes import codes
 

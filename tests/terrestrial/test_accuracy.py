@@ -10,16 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.accuracy import (
-    EXAMPLES,
-    as_printed,
-    grid,
-    required,
-    rounds_for,
-    supported,
-    worked,
-)
-from photostrip.terrestrial.frame import directions_from_photo, ground_from_photo
+from photostrip.terrestrial.accuracy import EXAMPLES, as_printed, grid, required, rounds_for, supported, worked
+from photostrip.terrestrial.normal_case import directions_from_photo, ground_from_photo
 from photostrip.units import ARCSECONDS
 from tests.loops import nonempty
 from tests.vectors import cases

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
-from photostrip.terrestrial.frame import (
+from photostrip.terrestrial.normal_case import (
     angles_of,
     direction_gradient,
     directions_from_photo,

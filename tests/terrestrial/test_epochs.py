@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.terrestrial.frame import small_turn
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series, Step, monitor
-from photostrip.terrestrial.normal_case import intersect, to_normal
+from photostrip.terrestrial.normal_case import intersect, small_turn, to_normal
 from tests.loops import nonempty
 from tests.terrestrial.simulated import CENTERS, SIGMA, World, repeated, turned, weighted, world
 

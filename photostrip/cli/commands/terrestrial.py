@@ -142,7 +142,7 @@ def one_station(  # noqa: PLR0913 (an argument for each option)
     from photostrip.project.terrestrial import options
     from photostrip.project.terrestrial.ranges import DISTANCE, SIGNIFICANCE, within
     from photostrip.report.commands.terrestrial_displacements import one_station_report
-    from photostrip.terrestrial import one_station as computed
+    from photostrip.terrestrial import camera_motion as computed
 
     chosen, attitude = camera.chosen(), looking.attitude()
     level = within("--significance", significance, SIGNIFICANCE)

@@ -15,7 +15,7 @@ from photostrip.cli.options import Silent
 
 if TYPE_CHECKING:
     from photostrip.formats.output.terrestrial_directions import Attitude, Grid, Theodolite
-    from photostrip.terrestrial.frame import Phototheodolite
+    from photostrip.terrestrial.normal_case import Phototheodolite
 
 MOST_POINTS = 20_000  # of a table over the photo
 COMMAND = "photostrip terrestrial directions"

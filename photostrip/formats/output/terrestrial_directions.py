@@ -13,7 +13,7 @@ from photostrip.formats.output.csv_text import to_csv
 from photostrip.notes import Document
 from photostrip.result.numbers import EXACT, rounded, significant
 from photostrip.terrestrial import accuracy
-from photostrip.terrestrial.frame import Phototheodolite, directions_from_photo, photo_from_directions
+from photostrip.terrestrial.normal_case import Phototheodolite, directions_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
 from photostrip.units import ARCSECONDS, MICROMETRES
 

@@ -13,13 +13,12 @@ from photostrip.formats.output.terrestrial_directions import ARCSEC, IMAGE_UM, R
 from photostrip.notes import Document, Note
 from photostrip.result.numbers import natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
-from photostrip.terrestrial.frame import Phototheodolite
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
-from photostrip.terrestrial.normal_case import SIDES, ellipses
+from photostrip.terrestrial.normal_case import SIDES, Phototheodolite, ellipses
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:
-    from photostrip.terrestrial.one_station import OneStation, OneStationResult
+    from photostrip.terrestrial.camera_motion import OneStation, OneStationResult
 
 METRE = 6  # decimals: a micrometre on the ground
 COVARIANCES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))

@@ -15,7 +15,7 @@ from photostrip.project.schema.values import Fraction, Number, Range, Words, bou
 from photostrip.project.terrestrial.cameras import Distance, Size
 from photostrip.project.terrestrial.options import chosen_camera, required_format
 from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
-from photostrip.terrestrial.forecast import DisplacementSpec
+from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import MICROMETRES
 
 PRESET = "UMK 10/1318"

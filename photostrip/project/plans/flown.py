@@ -12,7 +12,7 @@ from typing import Annotated, TypeVar
 
 from photostrip.camera import Camera
 from photostrip.formats.text.findings import Findings
-from photostrip.planning.strip.ideal_strip import StripGeometry
+from photostrip.planning.ideal_strip import StripGeometry
 from photostrip.project.schema.sections import After, Section, key, rule, wrong
 from photostrip.project.schema.values import Positive, Range, Triple, Words, bounded
 from photostrip.project.simulation import SimulatedCamera

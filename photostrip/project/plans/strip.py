@@ -8,10 +8,17 @@ from pathlib import Path
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.planning.strip.design import DesignReport, DesignTask, plan_strip
-from photostrip.planning.strip.ideal_strip import LAYOUTS, LEAST_PHOTOS, USES, ControlLayout, Spot, StripGeometry
-from photostrip.planning.strip.methods import BUNDLE, METHODS
-from photostrip.planning.strip.placement import Demand, Placement
+from photostrip.planning.ideal_strip import (
+    BUNDLE,
+    LAYOUTS,
+    LEAST_PHOTOS,
+    METHODS,
+    USES,
+    ControlLayout,
+    Spot,
+    StripGeometry,
+)
+from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
 from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of

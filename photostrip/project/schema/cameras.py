@@ -23,7 +23,7 @@ from photostrip.project.schema.values import (
     single,
 )
 from photostrip.strip.image_coordinates import pixel_cameras
-from photostrip.strip.image_coordinates.certificate import PLACES
+from photostrip.strip.image_coordinates.fiducial_marks import PLACES
 from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PIXEL_SIZE
 
 Place = Annotated[str, choice(tuple(PLACES))]

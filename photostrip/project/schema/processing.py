@@ -26,8 +26,8 @@ from photostrip.project.schema.values import (
     if_empty,
     quoted,
 )
-from photostrip.strip.independent_models.settings import METHODS as LINK_METHODS
-from photostrip.strip.polynomial.correction import DEGREES
+from photostrip.strip.independent_models.linking import METHODS as LINK_METHODS
+from photostrip.strip.polynomial import DEGREES
 from photostrip.strip.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
 from photostrip.strip.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
 

@@ -14,7 +14,7 @@ from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_
 from photostrip.project.yaml.parsing import parse, read_document
 from photostrip.project.yaml.tree import Node
 from photostrip.project.yaml.validation import checked
-from photostrip.terrestrial.frame import Phototheodolite
+from photostrip.terrestrial.normal_case import Phototheodolite
 
 OWN_LIST = "phototheodolites.yaml"
 SCHEMA_NUMBER = "1"

@@ -19,8 +19,8 @@ from photostrip.notes import Note
 from photostrip.project.schema.values import Range
 from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import preset, read_presets
-from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo, photo_from_directions
-from photostrip.terrestrial.one_station import OneStation
+from photostrip.terrestrial.camera_motion import OneStation
+from photostrip.terrestrial.normal_case import Phototheodolite, ground_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import FREE, Sightings
 from photostrip.units import ARCSECONDS
 

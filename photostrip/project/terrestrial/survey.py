@@ -23,9 +23,8 @@ from photostrip.project.terrestrial.survey_file import Camera, Measurements, Sta
 from photostrip.project.yaml.parsing import read_document
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.validation import valid_section
-from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
-from photostrip.terrestrial.normal_case import SIDES, StereoPair, normal_pair
+from photostrip.terrestrial.normal_case import SIDES, Phototheodolite, StereoPair, ground_from_photo, normal_pair
 from photostrip.terrestrial.orientation import OrientationSettings, orient
 
 USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none

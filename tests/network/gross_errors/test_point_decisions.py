@@ -14,17 +14,13 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.gross_errors import point_decisions
-from photostrip.network.gross_errors.point_decisions import (
-    CAUSES,
-    Decisions,
-    PointRays,
-)
+from photostrip.network import testing
 from photostrip.network.reliability import Limit
+from photostrip.network.testing import CAUSES, Decisions, PointRays
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors.pairs.deletion import LIKELIER
-from photostrip.strip.resection.collinearity import KnownPhotos, derivatives
+from photostrip.strip.gross_errors.pair_search import LIKELIER
+from photostrip.strip.resection import KnownPhotos, derivatives
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -73,7 +69,7 @@ def each_of(decided: Decisions) -> list[Decision]:
 
 def decide(point: PointRays, limit: Limit) -> Decision:
     """Decide on one point."""
-    (found,) = each_of(point_decisions.decide(together(point), limit))
+    (found,) = each_of(testing.decide(together(point), limit))
     return found
 
 
@@ -91,9 +87,7 @@ def together(*points: PointRays) -> PointRays:
 def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[Floats, Floats]:
     """Take sets of rays of one point out: sums of squares (s,) and errors (s, k, 2)."""
     normal = basis @ weight @ basis.T
-    found = point_decisions._without(
-        np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2
-    )
+    found = testing._without(np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2)
     return found.left[0], found.errors[0]
 
 
@@ -101,8 +95,8 @@ def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[
 def test_sets_of_many_points_are_taken_out_as_one_by_one(count: int) -> None:
     random = np.random.default_rng(count)
     root, pulled, total = random.normal(size=(5, 12, 15)), random.normal(size=(5, 12)), random.normal(size=5)
-    normal, sets = root @ root.swapaxes(1, 2), point_decisions.ray_sets(6, count).rays
-    left, errors = point_decisions._without(total, pulled, normal, sets, 2)
+    normal, sets = root @ root.swapaxes(1, 2), testing.ray_sets(6, count).rays
+    left, errors = testing._without(total, pulled, normal, sets, 2)
     for point, (row, rays) in nonempty(itertools.product(range(5), enumerate(sets))):
         at = (2 * rays[:, None] + np.arange(2)).ravel()
         error = np.linalg.solve(normal[point][np.ix_(at, at)], pulled[point, at])
@@ -141,15 +135,15 @@ def test_a_point_that_took_part_is_predicted_as_if_it_had_not(rays: int, gone: t
         inside=rows,
         misfit=point.misfit - by_photos @ shift[: 6 * rays] - point.by_point @ shift[6 * rays :],
     )
-    expected = point_decisions._misclosures(replace(point, of_photos=by_photos @ before @ by_photos.T))
-    found = point_decisions._misclosures(after)
+    expected = testing._misclosures(replace(point, of_photos=by_photos @ before @ by_photos.T))
+    found = testing._misclosures(after)
     assert found.gap == pytest.approx(expected.gap, rel=1e-5, abs=1e-5)
     assert found.weight == pytest.approx(expected.weight, rel=1e-5, abs=1e-7)
 
 
 def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() -> None:
     point = a_point(3, 5)
-    gap, weight, basis = point_decisions._misclosures(point)
+    gap, weight, basis = testing._misclosures(point)
     sets = [(0,), (3,), (4,)]
     left, errors = without(gap, weight, basis, np.array(sets))
     for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
@@ -245,7 +239,7 @@ def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float
     level = Limit(1.0, 1.0, 1e-12, 1.0)  # nearly any scatter of the rest is allowed: the comparison decides alone
 
     def next_best(size: float) -> float:
-        gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
+        gap, weight, basis = testing._misclosures(spoiled(point, {(0, 1): size}, 0.0))
         left, _ = without(gap, weight, basis, np.arange(3)[:, None])
         return float(np.partition(left, 1)[1] - left.min())
 
@@ -268,7 +262,7 @@ def test_points_are_decided_on_together_as_one_by_one() -> None:
     points = [
         replace(each, of_photos=root @ root.T, inside=np.arange(10) < size) for size, each in enumerate(points, 2)
     ]
-    decided = each_of(point_decisions.decide(together(*points), limit()))
+    decided = each_of(testing.decide(together(*points), limit()))
     for found, point in nonempty(zip(decided, points, strict=True)):
         alone = decide(point, limit())
         assert (found.out.tolist(), found.cause) == (alone.out.tolist(), alone.cause)
@@ -278,10 +272,10 @@ def test_points_are_decided_on_together_as_one_by_one() -> None:
 
 
 def test_points_with_as_many_rays_are_taken_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(point_decisions, "RAYS_AT_ONCE", 12)
+    monkeypatch.setattr(testing, "RAYS_AT_ONCE", 12)
     sizes = [(2, 0), (3, 0), (2, 3), (3, 0), (20, 0)] * 6
     rays, known = np.array(sizes).T
-    found = [each.tolist() for each in point_decisions.alike(rays, known)]
+    found = [each.tolist() for each in testing.alike(rays, known)]
     assert [len(each) for each in found] == [6, 6, 4, 4, 4, *[1] * 6]
     assert sorted(place for each in found for place in each) == list(range(len(sizes)))
     assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
@@ -289,8 +283,8 @@ def test_points_with_as_many_rays_are_taken_some_at_a_time(monkeypatch: pytest.M
 
 @pytest.mark.parametrize(("rays", "cause"), [(2, TWO_RAYS), (3, SEVERAL_RAYS)])
 def test_rays_that_meet_nowhere_are_left_out(rays: int, cause: str) -> None:
-    decided = point_decisions.decide(together(*(spoiled(a_point(seed, rays), {}) for seed in (1, 2))), limit())
-    good, nowhere = each_of(point_decisions.without_place(decided, np.array([False, True])))
+    decided = testing.decide(together(*(spoiled(a_point(seed, rays), {}) for seed in (1, 2))), limit())
+    good, nowhere = each_of(testing.without_place(decided, np.array([False, True])))
     assert not good.cause
     assert not good.out.any()
     assert good.value == decided.value[0]
@@ -301,7 +295,7 @@ def test_rays_that_meet_nowhere_are_left_out(rays: int, cause: str) -> None:
 
 @pytest.mark.parametrize(("rays", "count"), [(2, 1), (5, 2), (6, 3)])
 def test_every_ray_knows_the_sets_that_it_is_in(rays: int, count: int) -> None:
-    sets = point_decisions.ray_sets(rays, count)
+    sets = testing.ray_sets(rays, count)
     assert sets.of_ray.shape == (rays, math.comb(rays - 1, count - 1))
     assert (sets.rays[sets.of_ray, sets.place] == np.arange(rays)[:, None]).all()
     assert all(len(set(each)) == len(each) for each in nonempty(sets.of_ray.tolist()))
@@ -310,8 +304,8 @@ def test_every_ray_knows_the_sets_that_it_is_in(rays: int, count: int) -> None:
 def test_the_likeliest_set_with_a_ray_says_its_error() -> None:
     """Four of nine wrong: no set of three is enough, and all rays go, each with the error it would have."""
     point = spoiled(a_point(11, 9), {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(4)})
-    found, (gap, weight, basis) = decide(point, limit()), point_decisions._misclosures(point)
-    sets = point_decisions.ray_sets(9, 3).rays
+    found, (gap, weight, basis) = decide(point, limit()), testing._misclosures(point)
+    sets = testing.ray_sets(9, 3).rays
     left, errors = without(gap, weight, basis, sets)
     for ray, size in nonempty(enumerate(found.size)):
         best = min((value, row) for row, value in enumerate(left) if ray in sets[row])[1]
@@ -323,5 +317,5 @@ def test_a_point_that_holds_its_photos_alone_tests_nothing() -> None:
     point = a_point(6, 2)
     basis = np.linalg.qr(point.by_point, mode="complete")[0][:, 3:]
     held = replace(point, of_photos=basis @ basis.T, inside=np.ones(4, bool))
-    assert point_decisions._misclosures(held).weight[0, 0] == pytest.approx(1e-9, rel=0.01)
+    assert testing._misclosures(held).weight[0, 0] == pytest.approx(1e-9, rel=0.01)
     assert not decide(held, limit()).out.any()

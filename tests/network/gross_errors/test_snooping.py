@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
+from photostrip.network import snooping, strip_rays
+from photostrip.network.adjustment import Selection
+from photostrip.network.adjustment import solve as solve_once
 from photostrip.network.defects import MOST_FAILED
-from photostrip.network.gross_errors import snooping, strip_network
-from photostrip.network.gross_errors.point_decisions import WRONG
-from photostrip.network.gross_errors.ray_log import WrongRays
 from photostrip.network.reliability import CONTROL, groups_of, require_regular
-from photostrip.network.selection import Selection
 from photostrip.network.settings import BundleSettings
-from photostrip.network.solve import solve as solve_once
+from photostrip.network.testing import WRONG, WrongRays
 from photostrip.rejection import UNCONTROLLED, WRONG_RAY, Rejection
 from photostrip.simulation import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
@@ -24,8 +23,8 @@ from tests.pipeline.blocks import adjusted, simulate
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
+    from photostrip.network.adjustment import BundleSolution
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution
 
 BLOCK = Spec(flight=Flight(photos=6), points=Points(extra_per_model=8))
 
@@ -57,7 +56,7 @@ def test_the_level_grows_with_the_errors_that_are_established(problem: BundlePro
 
 def test_the_level_along_a_strip() -> None:
     """At a twentieth of the points wrong, as in the benchmark, errors of 3.7 standard deviations are found."""
-    q, i, left = strip_network.STRIP_LEVEL, 18, 900
+    q, i, left = strip_rays.STRIP_LEVEL, 18, 900
     assert normal_quantile(1 - i * q / (left + i * q) / 2) == pytest.approx(3.68, abs=0.08)
 
 

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from photostrip.network.gross_errors import point_decisions, ray_decisions, strip_network
+from photostrip.network import strip_rays, testing
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.result.document import document_of
-from photostrip.strip.strip_formation import non_neighbours
+from photostrip.strip import ray_intersection
 from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.network.gross_errors.point_decisions import Decisions, PointRays
-    from photostrip.network.gross_errors.strip_rays import StripRays
     from photostrip.network.reliability import Limit
+    from photostrip.network.strip_rays import StripRays
+    from photostrip.network.testing import Decisions, PointRays
     from photostrip.pipeline.results import Result
     from photostrip.strip.relative_orientation.orientation import Orientation
     from tests.strips import Flown
@@ -73,10 +73,10 @@ def found_in(strip: Flown, result: Result) -> dict[tuple[str, str], str]:
 def test_rays_meet_where_they_do() -> None:
     rng = np.random.default_rng(4)
     centers, xyz = rng.normal(0, 1, (20, 2, 3)), rng.normal(0, 1, (20, 3)) - [0, 0, 10]
-    meet, sound = non_neighbours.meeting(centers, (xyz[:, None] - centers) * rng.uniform(0.1, 3, (20, 2, 1)))
+    meet, sound = ray_intersection.meeting(centers, (xyz[:, None] - centers) * rng.uniform(0.1, 3, (20, 2, 1)))
     assert sound.all()
     assert meet == pytest.approx(xyz, abs=1e-6)
-    _, behind = non_neighbours.meeting(centers, centers - xyz[:, None])
+    _, behind = ray_intersection.meeting(centers, centers - xyz[:, None])
     assert not behind.any()
 
 
@@ -120,11 +120,13 @@ def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> 
 def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the whole adjustment and that of the point alone may differ in the last digit."""
 
+    decide = testing.decide
+
     def never(points: PointRays, limit: Limit) -> Decisions:
-        decided = point_decisions.decide(points, limit)
+        decided = decide(points, limit)
         return replace(decided, out=np.zeros_like(decided.out), cause=np.zeros_like(decided.cause))
 
-    monkeypatch.setattr(ray_decisions, "decide", never)
+    monkeypatch.setattr(testing, "decide", never)
     strip = spoiled(flown(), {("105", "p4_1"): (0.0, 0.4)})
     result = adjusted(strip)
     assert set(found_in(strip, result).values()) == {SEVERAL_RAYS}
@@ -135,13 +137,13 @@ def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: py
 def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five times the standard deviation on one photo: the others keep theirs."""
     found: list[Floats] = []
-    spread_of = strip_network._spread_of_photos
+    spread_of = strip_rays._spread_of_photos
 
     def kept(oriented: Orientation, rays: StripRays) -> Floats:
         found.append(spread_of(oriented, rays))
         return found[-1]
 
-    monkeypatch.setattr(strip_network, "_spread_of_photos", kept)
+    monkeypatch.setattr(strip_rays, "_spread_of_photos", kept)
     strip = flown(extra=200)
     xy, at = strip.observations.xy.copy(), strip.observations.photo == 6
     xy[at] += np.random.default_rng(3).normal(0, np.sqrt(24) * SIGMA, (at.sum(), 2))

@@ -14,7 +14,7 @@ from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Spec, Terrain
-from photostrip.strip.polynomial.correction import PolynomialSettings
+from photostrip.strip.polynomial import PolynomialSettings
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 from tests.simulated import inputs_of
 

@@ -16,10 +16,10 @@ from photostrip.pipeline.run import triangulate
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.strip.error_propagation import strip_at_control
-from photostrip.strip.independent_models import perspective_centers
-from photostrip.strip.independent_models.settings import LinkSettings
-from photostrip.strip.polynomial import correction
+from photostrip.strip import polynomial
+from photostrip.strip.gross_errors import control_search
+from photostrip.strip.independent_models import formation
+from photostrip.strip.independent_models.linking import LinkSettings
 from tests.loops import nonempty
 from tests.models import inputs, truth
 from tests.simulated import inputs_of
@@ -82,7 +82,7 @@ def test_a_bent_strip_takes_its_centers_along() -> None:
 
     beam = replace(given, points=bent(given.points), centers=bent(given.centers))
     points = beam.measured()
-    settings = Settings("polynomial", polynomial=correction.PolynomialSettings("2"))
+    settings = Settings("polynomial", polynomial=polynomial.PolynomialSettings("2"))
     plain, strip = (linked(inputs(given, points, bands=9), each) for each in (PLAIN, settings))
     off = [np.abs(s.intermediate.cartesian_from_intermediate(s.centers) - given.centers).max() for s in (plain, strip)]
     assert off[0] > 1.0
@@ -124,7 +124,7 @@ def test_centers_may_be_missing() -> None:
 @pytest.mark.parametrize("coordinates", [100, 27])
 def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordinates: int) -> None:
     """In sections, too."""
-    monkeypatch.setattr(strip_at_control, "LARGEST_SECTION", coordinates)
+    monkeypatch.setattr(control_search, "LARGEST_SECTION", coordinates)
     given = truth(8, 3, 4)
     noise = np.random.default_rng(1).normal(size=(len(given.model), 3))
     whole = inputs(given, given.measured(noise), bands=5)
@@ -173,7 +173,7 @@ def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
     x, y = 0.7, -0.4
     by_x = (field(x + step, y) - field(x - step, y)) / (2 * step)
     by_y = (field(x, y + step) - field(x, y - step)) / (2 * step)
-    rows = perspective_centers.displacement_rows(place, above, terms)
+    rows = formation.displacement_rows(place, above, terms)
     found = sum(row[0] @ c for row, c in zip(rows, coefficients, strict=True))
     tilt = 1.5 * np.array([-by_x[2], -by_y[2], (by_x[0] + by_y[1]) / 2])
     np.testing.assert_allclose(found, field(x, y) + tilt, atol=1e-9)

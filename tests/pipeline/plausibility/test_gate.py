@@ -21,8 +21,7 @@ from photostrip.notes import LOST_SAY
 from photostrip.pipeline.inputs import GivenOrientations, Settings
 from photostrip.pipeline.plausibility import evidence, gate, image_evidence
 from photostrip.pipeline.run import triangulate
-from photostrip.plausibility import KINDS
-from photostrip.plausibility.photos import flight_order
+from photostrip.plausibility import KINDS, flight_order
 from photostrip.points import PhotoPoints
 from photostrip.simulation import (
     DIGITAL,

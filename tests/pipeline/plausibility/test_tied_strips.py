@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline.run import triangulate
-from photostrip.plausibility.photos.tied_strips import TiesOfStrips, find_shared_ids_of_strips
+from photostrip.plausibility.ids import TiesOfStrips, find_shared_ids_of_strips
 from photostrip.simulation import Control, Flight, GrossError, Points, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import (
+from photostrip.planning.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,
@@ -24,8 +24,8 @@ from photostrip.planning.model.deformation import (
     rigorous_covariance,
     surface_of_elements,
 )
-from photostrip.planning.model.plan import source_example
-from photostrip.strip.relative_orientation import six_points
+from photostrip.planning.model_plan import source_example
+from photostrip.strip.relative_orientation import standard_points
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import ground_errors, orientation_factors, relative_differentials
 from tests.vectors import cases
@@ -145,7 +145,7 @@ def test_the_rigorous_formulas_are_the_scatter_of_exact_models() -> None:
 
 def test_elements_of_the_base_frame_and_of_the_dependent_pair() -> None:
     elements = np.array([2e-5, -3e-5, -4e-5, 6e-5, 5e-5])
-    dependent = six_points.dependent_from_base(B) @ elements
+    dependent = standard_points.dependent_from_base(B) @ elements
     assert base_frame_elements(dependent, B) == pytest.approx(elements)
 
 

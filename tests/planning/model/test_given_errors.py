@@ -9,8 +9,8 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import paraboloid_rows
-from photostrip.planning.model.plan import ControlPoint, ModelSpec, NamedPoint, both_forms, given_errors, plan_model
+from photostrip.planning.deformation import paraboloid_rows
+from photostrip.planning.model_plan import ControlPoint, ModelSpec, NamedPoint, both_forms, given_errors, plan_model
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import intersected
 

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photostrip.plausibility.photos import flight_order, mosaic, units
-from photostrip.plausibility.photos.units import reading_of
+from photostrip.plausibility import flight_order, mosaic, units
+from photostrip.plausibility.units import reading_of
 from photostrip.points import PhotoPoints
 from photostrip.simulation import Flight, Spec, simulate
 

@@ -15,7 +15,7 @@ from photostrip.report.pictures.ground.footprints import footprint_pictures
 from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
 from photostrip.result.records import as_lists
-from photostrip.simulation.ground import surface
+from photostrip.simulation.flight import surface
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Ground, Image, Spec, Terrain
 from tests.loops import nonempty

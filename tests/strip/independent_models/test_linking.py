@@ -18,8 +18,8 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models, models_of
-from photostrip.strip.independent_models import link_screening, linking
-from photostrip.strip.independent_models.settings import LinkSettings
+from photostrip.strip.independent_models import linking
+from photostrip.strip.independent_models.linking import LinkSettings
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def test_residuals_have_the_variance_that_is_stated() -> None:
     solved = formed.links.solved
     ratio = solved.squares.sum() / solved.redundancy.sum()
     assert 0.8 < ratio < 1.2
-    assert np.median(formed.links.value) == pytest.approx(link_screening.MEDIAN, rel=0.25)
+    assert np.median(formed.links.value) == pytest.approx(linking.MEDIAN, rel=0.25)
 
 
 def test_redundancies_add_up() -> None:
@@ -235,8 +235,8 @@ def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
         models = models_of(strip_of(measured), measured, LinkSettings())
         shared = linking.common(models)
         none = np.zeros(len(shared.link), bool)
-        plain = link_screening.screen_links(shared, models, LinkSettings("none"), none)
-        size = link_screening.detectable(shared, plain)[0]
+        plain = linking.screen_links(shared, models, LinkSettings("none"), none)
+        size = linking.detectable(shared, plain)[0]
         solved = plain.solved
         reduced = solved.weight - solved.weight @ solved.design @ solved.cofactors[
             shared.link] @ solved.design.transpose(0, 2, 1) @ solved.weight  # fmt: skip
@@ -258,4 +258,4 @@ def test_four_points_contradict_the_stated_precision(known: int, redundancy: int
     value = np.full(known, 50.0 * chi2.median(3))
     tests = linking.PointTests(value=value, error=np.zeros((known, 3)), freedom=np.full(known, 3))
     solved = cast("linking.SolvedLinks", SimpleNamespace(redundancy=np.array([redundancy])))
-    assert link_screening._scatter(tests, solved) == pytest.approx(factor, rel=1e-3)
+    assert linking._scatter(tests, solved) == pytest.approx(factor, rel=1e-3)

@@ -16,10 +16,10 @@ from scipy.stats import f as f_distribution
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings as RunSettings
 from photostrip.pipeline.run import triangulate
+from photostrip.strip import polynomial
 from photostrip.strip.absolute_orientation import PointPrecision, weights
-from photostrip.strip.polynomial import correction
-from photostrip.strip.polynomial.correction import FitProblem, PolynomialSettings, fit
-from photostrip.strip.polynomial.terms import DROP_ORDER, LADDER, POWERS, bands, choose_terms, count_stations
+from photostrip.strip.polynomial import FitProblem, PolynomialSettings, fit
+from photostrip.strip.polynomial_terms import DROP_ORDER, LADDER, POWERS, bands, choose_terms, count_stations
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.strips import MICROMETRE, control_points, fly, project, targets
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from photostrip.pipeline.results import Result
-    from photostrip.strip.polynomial.correction import Evidence, Polynomial
+    from photostrip.strip.polynomial import Evidence, Polynomial
     from tests.strips import Flown
     from tests.vectors import Vector
 
@@ -334,8 +334,8 @@ def test_the_f_test_and_left_out_control_must_agree_on_a_step(
 ) -> None:
     xyz = layout(SEVEN)
     one = noisy(1, bent(xyz, 2.0, 2), xyz)
-    monkeypatch.setattr(correction, "_f_test", lambda *_: (1.0, p))
-    monkeypatch.setattr(correction, "_left_out_errors", lambda *_: ([1.0] + [rich] * 9, "band"))
+    monkeypatch.setattr(polynomial, "_f_test", lambda *_: (1.0, p))
+    monkeypatch.setattr(polynomial, "_left_out_errors", lambda *_: ([1.0] + [rich] * 9, "band"))
     assert (fit(one, PolynomialSettings()).degree > 0) == taken
 
 
@@ -375,7 +375,7 @@ def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, given_, sigma=sigma)
     found = fit(one, PolynomialSettings("3"))
     inner = [np.arange(3 * band, 3 * band + 3) for band in range(1, 6)]
-    for group, axes in nonempty(correction.GROUPS):
+    for group, axes in nonempty(polynomial.GROUPS):
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "band"
             terms = {1: ("1", "X", "Y"), 2: SQUARE, 3: CUBIC}[evidence.degree]
@@ -391,7 +391,7 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, PolynomialSettings("2"))
     single = [[row] for row in range(9)]
-    for group, axes in nonempty(correction.GROUPS):
+    for group, axes in nonempty(polynomial.GROUPS):
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "point"
             terms = {1: ("1", "X", "Y"), 2: SQUARE}[evidence.degree]
@@ -410,7 +410,7 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, PolynomialSettings("auto"))
     group = bands(xyz[:, 0], one.spacing)
-    for kind, _ in nonempty(correction.GROUPS):
+    for kind, _ in nonempty(polynomial.GROUPS):
         richest = steps(found, kind)[-1]
         terms = choose_terms(xyz, 3, one.sizes)
         rest = [xyz[group != band] for band in range(1, group.max())]

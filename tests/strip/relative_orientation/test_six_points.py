@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
-from photostrip.strip.relative_orientation import six_points
+from photostrip.strip.relative_orientation import standard_points
 from photostrip.strip.relative_orientation.solution import solve_elements
 from tests.loops import nonempty
 from tests.strips import attitude, batch
@@ -60,7 +60,7 @@ def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: flo
     )
 
 
-def standard_points(width: float, base: float) -> Floats:
+def six_points(width: float, base: float) -> Floats:
     return np.array([[0, 0], [base, 0], [0, width], [base, width], [0, -width], [base, -width]])
 
 
@@ -100,9 +100,9 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
     assert found.closing_error == pytest.approx(expected["closing_W"], rel=rel)
     assert found.sigma == pytest.approx(expected["m_q"], rel=rel)
     assert np.allclose(found.residuals, expected["residuals"], rtol=rel, atol=0)
-    q = six_points.cofactors(f, a, b)
+    q = standard_points.cofactors(f, a, b)
     assert np.allclose(q, expected["cofactor"], rtol=rel, atol=1e-18)
-    t = six_points.dependent_from_base(b)
+    t = standard_points.dependent_from_base(b)
     dependent = t @ q @ t.T
     formulas = expected["cofactor_formulas"]
     values = {
@@ -141,7 +141,7 @@ def test_all_examples_are_here() -> None:
 
 @given(LENGTHS, LENGTHS, LENGTHS, st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_the_closed_forms_are_the_linear_least_squares(f: float, a: float, b: float, q: list[float]) -> None:
-    jacobian = design(standard_points(a, b), f, b)
+    jacobian = design(six_points(a, b), f, b)
     found = orient_six_points(q, f, a, b)
     solution, *_ = np.linalg.lstsq(jacobian, -np.array(q), rcond=None)
     size = np.abs(solution).max() + 1e-12
@@ -149,14 +149,14 @@ def test_the_closed_forms_are_the_linear_least_squares(f: float, a: float, b: fl
     assert np.allclose(found.residuals, np.array(q) + jacobian @ solution, rtol=0, atol=1e-9)
     assert found.sigma == pytest.approx(np.linalg.norm(found.residuals), abs=1e-9)
     inverse = np.linalg.inv(jacobian.T @ jacobian)
-    assert np.allclose(six_points.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
+    assert np.allclose(standard_points.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
 
 
 @given(LENGTHS, LENGTHS)
 def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
     f = 153.0
-    t = six_points.dependent_from_base(b)
-    found = t @ six_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
+    t = standard_points.dependent_from_base(b)
+    found = t @ standard_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
     expected = np.zeros((5, 5))
     np.fill_diagonal(
         expected,
@@ -178,7 +178,7 @@ def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
 @given(st.tuples(SMALL, SMALL, SMALL, SMALL, SMALL))
 def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
     f, a, b = 150.0, 90.0, 90.0
-    left = standard_points(a, b)
+    left = six_points(a, b)
     right = left - [b, 0]
     q = -design(left, f, b) @ np.array(elements)
     pairs = batch(left[None], (right - np.column_stack([np.zeros(6), q]))[None], f)
@@ -202,7 +202,7 @@ def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
 
 def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
     b, step = 92.0, 1e-5
-    t = six_points.dependent_from_base(b)
+    t = standard_points.dependent_from_base(b)
     for number in range(5):
         elements = np.zeros(5)
         elements[number] = step

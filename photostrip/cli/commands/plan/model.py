@@ -12,7 +12,7 @@ from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options,
 from photostrip.cli.stdout import Document
 
 if TYPE_CHECKING:
-    from photostrip.planning.model.plan import ModelSpec
+    from photostrip.planning.model_plan import ModelSpec
 
 FINE = 41  # points along and across of a picture
 
@@ -60,7 +60,7 @@ def model(
 ) -> None:
     """Compute the expected errors all over one model, and what each source of errors does alone."""
     from photostrip.formats.output.plans.model import model_document, source_example_document
-    from photostrip.planning.model.plan import both_forms, given_errors, plan_model
+    from photostrip.planning.model_plan import both_forms, given_errors, plan_model
     from photostrip.project.plans.model import load_model_plan
 
     if as_printed and not closed_form:

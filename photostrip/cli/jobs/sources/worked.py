@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
-from photostrip.planning.model.plan import source_example
+from photostrip.planning.model_plan import source_example
 from photostrip.terrestrial.accuracy import EXAMPLES, worked
 
 # [004a]: errors that were put in, found by the residual parallax, found by Grubbs' test, missed; good points rejected

@@ -6,7 +6,7 @@ import numpy as np
 
 from photostrip.notes import Document
 from photostrip.result.numbers import micrometres, rounded, significant
-from photostrip.terrestrial.forecast import PLACES, DisplacementSpec, plan_displacements
+from photostrip.terrestrial.accuracy import PLACES, DisplacementSpec, plan_displacements
 
 DECIMALS = 6  # decimals of metres: displacements are small
 

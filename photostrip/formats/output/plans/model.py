@@ -8,9 +8,9 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import Document
-from photostrip.planning.model.closed_form import ORDER
-from photostrip.planning.model.deformation import DEFORMATION_TERMS
-from photostrip.planning.model.plan import (
+from photostrip.planning.closed_form import ORDER
+from photostrip.planning.deformation import DEFORMATION_TERMS
+from photostrip.planning.model_plan import (
     BothForms,
     Forecast,
     GivenErrors,
@@ -19,7 +19,7 @@ from photostrip.planning.model.plan import (
     simple_accuracy,
     source_example,
 )
-from photostrip.planning.model.single_model import ELEMENTS, FREE, PARAMETERS
+from photostrip.planning.single_model import ELEMENTS, FREE, PARAMETERS
 from photostrip.result.numbers import GROUND, micrometres, rms, rounded, significant
 from photostrip.units import ARCSECONDS, MICROMETRES
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import Document
-from photostrip.planning.strip.design import DesignReport, Needed, Outcome, along_the_strip
-from photostrip.planning.strip.ideal_strip import ControlLayout, IdealStrip, Spot, numbers_of
-from photostrip.planning.strip.placement import BestPlaces, worst
+from photostrip.planning.ideal_strip import ControlLayout, IdealStrip, Spot, numbers_of
+from photostrip.planning.strip_design import BestPlaces, DesignReport, Needed, Outcome, along_the_strip, worst
 from photostrip.result.numbers import GROUND, micrometres, rms, rounded, significant
 
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric

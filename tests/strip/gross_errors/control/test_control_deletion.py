@@ -21,12 +21,10 @@ from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
 from photostrip.strip.absolute_orientation import Targets
-from photostrip.strip.error_propagation import strip_at_control
-from photostrip.strip.error_propagation.control_errors import Misclosures
-from photostrip.strip.error_propagation.strip_at_control import StripAtControl
-from photostrip.strip.gross_errors.control import control_screening
-from photostrip.strip.gross_errors.control.control_deletion import adjust
-from photostrip.strip.gross_errors.control.control_rejections import FoundErrors, reliability
+from photostrip.strip.fitted_strip import Misclosures
+from photostrip.strip.gross_errors import control_screening, control_search
+from photostrip.strip.gross_errors.control_screening import FoundErrors, reliability
+from photostrip.strip.gross_errors.control_search import StripAtControl, adjust
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, control_points, fly, project
 
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline.results import Result
-    from photostrip.strip.gross_errors.control.control_deletion import JointAdjustment
+    from photostrip.strip.gross_errors.control_search import JointAdjustment
     from tests.strips import Flown
 
     Flags = NDArray[np.bool_]
@@ -276,7 +274,7 @@ def test_a_plan_error_of_two_metres_does_not_pass() -> None:
 
 
 def test_a_wrong_point_is_found_in_sections_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(strip_at_control, "LARGEST_SECTION", 27)
+    monkeypatch.setattr(control_search, "LARGEST_SECTION", 27)
     strip = flown()
     found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_1": (0.0, 0.0, 8.0)}).strips[0]
     assert [(found.control.ids[each.row], each.axes) for each in found.wrong_control] == [("p6_1", (2,))]

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors.pairs import deletion, pair_search, screening
-from photostrip.strip.gross_errors.pairs.global_test import GlobalTest, ParallaxScatter
+from photostrip.strip.gross_errors import pair_screening, pair_search
+from photostrip.strip.gross_errors.pair_search import GlobalTest, ParallaxScatter
 from photostrip.strip.relative_orientation import robust, solution
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
 from photostrip.strip.robust import falling_weights
@@ -39,9 +39,11 @@ def spoiled(flown: TruePairs, errors: Floats) -> Pairs:
     return replace(flown.pairs, left=left)
 
 
-def examined(pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA) -> screening.ScreenedPairs:
+def examined(
+    pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA
+) -> pair_screening.ScreenedPairs:
     oriented, converged = orient_unchecked(pairs)
-    return screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
+    return pair_screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
 
 
 def level(seed: int, pairs: int, counts: tuple[int, ...] = (2, 2, 3, 3, 3, 3), sigma: float = SIGMA) -> TruePairs:
@@ -57,8 +59,8 @@ def test_a_gain_is_what_an_adjustment_without_the_points_loses(seed: int, n: int
     design, values = rng.normal(size=(n, 5)), rng.normal(size=n)
     matrix = np.eye(n) - design @ np.linalg.pinv(design)
     residual = matrix @ values
-    sets = deletion.subsets(n, k)
-    found = deletion.gains(residual[None], matrix[None], sets)[0]
+    sets = pair_search.subsets(n, k)
+    found = pair_search.gains(residual[None], matrix[None], sets)[0]
     for place in nonempty(rng.choice(len(sets), 5)):
         rest = np.setdiff1d(np.arange(n), sets[place])
         squares = np.linalg.lstsq(design[rest], values[rest], rcond=None)[1][0]
@@ -66,14 +68,14 @@ def test_a_gain_is_what_an_adjustment_without_the_points_loses(seed: int, n: int
 
 
 def test_the_subsets_are_all_there_are() -> None:
-    assert deletion.subsets(16, 3).shape == (560, 3)
-    assert deletion.subsets(5, 2).tolist() == [list(pair) for pair in combinations(range(5), 2)]
+    assert pair_search.subsets(16, 3).shape == (560, 3)
+    assert pair_search.subsets(5, 2).tolist() == [list(pair) for pair in combinations(range(5), 2)]
 
 
 def test_a_set_that_empties_a_parameter_gains_nothing() -> None:
     design = np.array([[1.0, 0], [1, 0], [1, 0], [0, 1]])
     matrix = np.eye(4) - design @ np.linalg.pinv(design)
-    assert deletion.gains(np.zeros((1, 4)), matrix[None], np.array([[3]]))[0, 0] == -np.inf
+    assert pair_search.gains(np.zeros((1, 4)), matrix[None], np.array([[3]]))[0, 0] == -np.inf
 
 
 def adjusted(rng: np.random.Generator, n: int, wrong: int) -> tuple[Floats, Floats]:
@@ -89,11 +91,11 @@ def test_the_search_finds_the_best_of_all_sets(seed: int, n: int, wrong: int) ->
     residual, basis = adjusted(np.random.default_rng(seed), n, wrong)
     target = np.array([chi2_quantile(0.9995, n - 5 - k) if n - k >= 6 else -np.inf for k in (1, 2, 3)])
     matrix = np.eye(n) - basis @ basis.transpose(0, 2, 1)
-    (found,) = deletion.search(residual, basis, target)
+    (found,) = pair_search.smallest_sets(residual, basis, target)
     total = float((residual**2).sum())
     for k in (1, 2, 3):
-        sets = deletion.subsets(n, k)
-        gain = deletion.gains(residual, matrix, sets)[0]
+        sets = pair_search.subsets(n, k)
+        gain = pair_search.gains(residual, matrix, sets)[0]
         if total - gain.max() <= target[k - 1]:
             assert found.tolist() == sets[gain.argmax()].tolist()
             return
@@ -104,14 +106,14 @@ def test_the_search_finds_the_best_of_all_sets(seed: int, n: int, wrong: int) ->
 def test_of_many_points_few_are_formed_into_sets(wrong: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """All sets of two of 800 points are 319 600; none is formed where not even the largest residuals would do."""
     residual, basis = adjusted(np.random.default_rng(8), 800, wrong)
-    formed, gains = list[int](), deletion.gains
+    formed, gains = list[int](), pair_search.gains
 
     def counted(residuals: Floats, matrix: Floats, sets: NDArray[np.intp]) -> Floats:
         formed.append(len(sets))
         return gains(residuals, matrix, sets)
 
-    monkeypatch.setattr(deletion, "gains", counted)
-    (found,) = deletion.search(residual, basis, np.array([chi2_quantile(0.9995, 795 - k) for k in (1, 2, 3)]))
+    monkeypatch.setattr(pair_search, "gains", counted)
+    (found,) = pair_search.smallest_sets(residual, basis, np.array([chi2_quantile(0.9995, 795 - k) for k in (1, 2, 3)]))
     assert len(found) == (2 if wrong == 2 else 0)
     assert sum(formed) <= most
 
@@ -388,7 +390,7 @@ def test_a_residual_with_a_redundancy_below_a_hundredth_says_nothing() -> None:
         redundancy = np.full(16, share)
         value = GlobalTest.of(np.ones(1)).standardised(replace(oriented, redundancy=redundancy))
         assert (value > 0).all() == speaks
-        gain = deletion.gains(np.ones((1, 1)), np.full((1, 1, 1), share), np.zeros((1, 1), int))
+        gain = pair_search.gains(np.ones((1, 1)), np.full((1, 1, 1), share), np.zeros((1, 1), int))
         assert np.isfinite(gain).all() == speaks
 
 
@@ -396,7 +398,7 @@ def test_sets_of_three_are_formed_from_24_points() -> None:
     rng = np.random.default_rng(20)
     design = rng.normal(size=(30, 5))
     matrix = np.eye(30) - design @ np.linalg.pinv(design)
-    assert deletion._triples((matrix @ rng.normal(size=30))[None], matrix[None]).shape == (1, 2024, 3)
+    assert pair_search._triples((matrix @ rng.normal(size=30))[None], matrix[None]).shape == (1, 2024, 3)
 
 
 @pytest.mark.parametrize(("ratio", "contradicted"), [(1.28, False), (1.35, True)])
@@ -439,13 +441,13 @@ def test_the_number_of_pairs_at_a_time_is_for_the_memory_and_changes_nothing(mon
     rng = np.random.default_rng(26)
     wrong = rng.permuted(np.tile(np.arange(18) < 4, (96, 1)), axis=1)
     pairs = spoiled(flown, np.where(wrong, rng.uniform(0.1, 5.0, wrong.shape), 0.0))
-    sizes, of_sets = list[int](), deletion.search
+    sizes, of_sets = list[int](), pair_search.smallest_sets
 
     def counted(residuals: Floats, *others: Any) -> Any:  # noqa: ANN401 (as they are)
         sizes.append(len(residuals))
         return of_sets(residuals, *others)
 
-    monkeypatch.setattr(deletion, "search", counted)
+    monkeypatch.setattr(pair_search, "search", counted)
     used = examined(pairs).orientation.used
     assert 40 < max(sizes) <= 64
     monkeypatch.setattr(pair_search, "AT_ONCE", 10)

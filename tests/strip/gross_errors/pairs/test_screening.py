@@ -10,7 +10,7 @@ import pytest
 
 from photostrip.errors import EXIT_INPUT, InputError
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.strip.gross_errors.pairs import screening
+from photostrip.strip.gross_errors import pair_screening
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, assess_pairs, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.relative_orientation.solution import solve_elements
@@ -35,7 +35,7 @@ ZONES = (2, 2, 3, 3, 3, 3)  # points of the six zones in the published experimen
 
 def screened(orientation: Orientation, settings: RelativeSettings, sigma: float) -> tuple[Orientation, Log]:
     """Reject points and give the pairs without them, and the log."""
-    found = screening.screen_pairs(orientation, settings, sigma)
+    found = pair_screening.screen_pairs(orientation, settings, sigma)
     return found.orientation, found.rejections
 
 
@@ -81,8 +81,8 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     expected, test = example.expected[f"parallax_then_{second}"], second.removeprefix("studentised_")
     oriented, names = of_example(example)
     rel = example.tol["values_rel"]
-    after, log = screening._stage(oriented, "parallax", example.input["T_mm"])
-    found, rest = screening._stage(after, test, example.input["alpha"])
+    after, log = pair_screening._stage(oriented, "parallax", example.input["T_mm"])
+    found, rest = pair_screening._stage(after, test, example.input["alpha"])
     log = [*log, *rest]
     rejected = [line for line in expected["log"] if line.get("rejected", True)]
     assert [(entry.test, names[entry.row]) for entry in log] == [(line["stage"], line["id"]) for line in rejected]
@@ -91,7 +91,7 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     compare(found, tuple(log), names, expected, example.tol)
     last = expected["log"][-1]
     if not last.get("rejected", True):  # the largest value of the last round stays below its limit
-        value, limit, _ = screening.tested(found, test, example.input["alpha"])
+        value, limit, _ = pair_screening.tested(found, test, example.input["alpha"])
         value[~found.used] = -np.inf
         assert names[int(value.argmax())] == last["id"]
         assert value.max() == pytest.approx(last["value"], rel=rel)
@@ -161,7 +161,7 @@ def test_the_shares_of_the_published_experiment(limit: float, published: dict[st
 @pytest.mark.parametrize(("method", "share"), [("grubbs", 0.025), ("tau", 0.052)])
 def test_false_alarms_of_clean_models(method: str, share: float) -> None:
     oriented, _ = experiment(2, 4000, errors=False)
-    value, limit, _ = screening.tested(oriented, method, 0.05)
+    value, limit, _ = pair_screening.tested(oriented, method, 0.05)
     alarms = np.maximum.reduceat(value > limit, oriented.pairs.starts).mean()
     assert alarms == pytest.approx(share, abs=4 * np.sqrt(share / 4000))
 
@@ -277,24 +277,24 @@ def test_a_pair_keeps_six_points(method: str) -> None:
 
 def test_grubbs_needs_seven_points() -> None:
     six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
-    assert np.all(screening.tested(six, "grubbs", 0.05)[1] == np.inf)
+    assert np.all(pair_screening.tested(six, "grubbs", 0.05)[1] == np.inf)
     seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
-    assert screening.tested(seven, "grubbs", 0.05)[1][0] == pytest.approx(grubbs_limit(7, 0.05))
+    assert pair_screening.tested(seven, "grubbs", 0.05)[1][0] == pytest.approx(grubbs_limit(7, 0.05))
 
 
 def test_residuals_below_a_millionth_of_a_micrometre_are_rounding() -> None:
     oriented = clean(10).orient()
     pattern = np.where(np.arange(16) % 2, 1.0, -1.0) * np.sqrt(15 / 16)  # of a standard deviation of one
     for size, tested in ((0.8e-9, False), (1.6e-9, True)):
-        limit = screening.tested(replace(oriented, parallax=size * pattern), "grubbs", 0.05)[1]
+        limit = pair_screening.tested(replace(oriented, parallax=size * pattern), "grubbs", 0.05)[1]
         assert np.isfinite(limit).all() == tested
 
 
 def test_tau_needs_a_redundancy_of_three() -> None:
     seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
-    assert np.all(screening.tested(seven, "tau", 0.05)[1] == np.inf)
+    assert np.all(pair_screening.tested(seven, "tau", 0.05)[1] == np.inf)
     eight = spoiled(clean(10, points=(2, 2, 1, 1, 1, 1)), {0: 3.0})
-    assert screening.tested(eight, "tau", 0.05)[1][0] == pytest.approx(tau_limit(8, 5, 0.05))
+    assert pair_screening.tested(eight, "tau", 0.05)[1][0] == pytest.approx(tau_limit(8, 5, 0.05))
 
 
 @pytest.mark.parametrize("method", ["ransac", "Tau", ""])
