@@ -27,15 +27,15 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # before numpy is imported, also in the processes that are started here
 
-import numpy as np
+import numpy as np  # noqa: E402
 
-from photostrip.geodesy.tying import tie_frames
-from photostrip.geometry.rotation import from_vector
-from photostrip.pipeline.run import triangulate
-from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec
-from photostrip.strip import polynomial, polynomial_terms
-from tests.simulated import inputs_of, settings_of
+from photostrip.geodesy.tying import tie_frames  # noqa: E402
+from photostrip.geometry.rotation import from_vector  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
+from photostrip.strip import polynomial, polynomial_terms  # noqa: E402
+from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -23,13 +23,13 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # before numpy is imported, also in the processes that are started here
 
-import numpy as np
+import numpy as np  # noqa: E402
 
-from benchmarks import peers
-from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of
-from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate
-from tests.simulated_bundle import problem_of
+from benchmarks import peers  # noqa: E402
+from photostrip.network.adjustment import solve  # noqa: E402
+from photostrip.network.cofactors import cofactors_of  # noqa: E402
+from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
+from tests.simulated_bundle import problem_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -219,7 +219,7 @@ def _peak(given: BundleProblem) -> tuple[float, float]:
     """Peak memory of a process that adjusts a problem, MB: all of it, and what it had before, the arrays included."""
     import resource
 
-    import scipy.linalg.lapack
+    import scipy.linalg.lapack  # noqa: F401
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
     cofactors_of(solve(given))

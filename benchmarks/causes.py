@@ -130,7 +130,7 @@ def some_photos(rng: Rng, low: int, high: int) -> int:
     return round(float(np.exp(rng.uniform(np.log(low), np.log(high + 0.4)))))
 
 
-def every(spec: Spec, models: int, **control: Any) -> Spec:
+def every(spec: Spec, models: int, **control: Any) -> Spec:  # noqa: ANN401
     """Give a strip a band of control every so many models."""
     return replace(spec, control=replace(spec.control, every=models, **control))
 

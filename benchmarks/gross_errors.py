@@ -35,16 +35,16 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # as the command does, before numpy is imported
 
-import numpy as np
+import numpy as np  # noqa: E402
 
-from photostrip.errors import PhotostripError
-from photostrip.pipeline.inputs import CameraPositions
-from photostrip.pipeline.run import triangulate
-from photostrip.points import locate
-from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec
-from photostrip.strip.gross_errors.control_screening import EITHER, WRONG_IMAGE
-from tests.simulated import inputs_of, settings_of
+from photostrip.errors import PhotostripError  # noqa: E402
+from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
+from photostrip.points import locate  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
+from photostrip.strip.gross_errors.control_screening import EITHER, WRONG_IMAGE  # noqa: E402
+from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

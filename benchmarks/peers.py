@@ -59,8 +59,8 @@ class Peer:
 def available() -> bool:
     """Say whether pyceres and pycolmap are installed."""
     try:
-        import pyceres
-        import pycolmap.cost_functions
+        import pyceres  # noqa: F401
+        import pycolmap.cost_functions  # noqa: F401
     except ImportError:
         return False
     return True

@@ -23,18 +23,18 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # before numpy is imported, also in the processes that are started here
 
-import numpy as np
+import numpy as np  # noqa: E402
 
-from photostrip.camera import Camera
-from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.method import adjust_formed
-from photostrip.pipeline.strips.photos import form_strip
-from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spec, Terrain
-from photostrip.strip import polynomial
-from photostrip.strip.relative_orientation.orientation import RelativeSettings
-from tests.simulated import inputs_of
+from photostrip.camera import Camera  # noqa: E402
+from photostrip.pipeline.inputs import Settings  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
+from photostrip.pipeline.strips.method import adjust_formed  # noqa: E402
+from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
+from photostrip.strip import polynomial  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import RelativeSettings  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from multiprocessing.pool import Pool
@@ -177,7 +177,7 @@ def stated(case: Case, method: str) -> tuple[Floats, Floats]:
     """Stated variances of points and photos, along the axes of the intermediate frame."""
     inputs = drawn(true_inputs(case.spec), np.random.default_rng(5))
     (strip,), precision = (result := triangulate(inputs, settings(method))).strips, result.precision
-    assert precision is not None
+    assert precision is not None  # noqa: S101
     factor = (inputs.observations.sigma[0, 0] / precision.sigma[0]) ** 2  # chance contradicts one strip in a hundred
     axes, both = strip.intermediate.axes, np.zeros((6, 6))
     both[:3, :3] = both[3:, 3:] = axes

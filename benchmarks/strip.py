@@ -34,31 +34,31 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # as the command does, before numpy is imported
 
-import numpy as np
+import numpy as np  # noqa: E402
 
-from photostrip.formats.output.result_json import read_result
-from photostrip.formats.output.simulation import project_files
-from photostrip.formats.text.writing import write_files
-from photostrip.library.result import Result
-from photostrip.pipeline import precision
-from photostrip.pipeline.plausibility import gate
-from photostrip.pipeline.run import triangulate
-from photostrip.project.loading import load_project
-from photostrip.report.page import console
-from photostrip.report.sections.accuracy_report import chosen_sections, title_of
-from photostrip.result.document import document_of
-from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec
-from photostrip.strip import (
+from photostrip.formats.output.result_json import read_result  # noqa: E402
+from photostrip.formats.output.simulation import project_files  # noqa: E402
+from photostrip.formats.text.writing import write_files  # noqa: E402
+from photostrip.library.result import Result  # noqa: E402
+from photostrip.pipeline import precision  # noqa: E402
+from photostrip.pipeline.plausibility import gate  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
+from photostrip.project.loading import load_project  # noqa: E402
+from photostrip.report.page import console  # noqa: E402
+from photostrip.report.sections.accuracy_report import chosen_sections, title_of  # noqa: E402
+from photostrip.result.document import document_of  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402
+from photostrip.strip import (  # noqa: E402
     absolute_orientation,
     polynomial,
 )
-from photostrip.strip.gross_errors import control_screening, pair_screening
-from photostrip.strip.image_coordinates import corrections
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.relative_orientation.solution import iterate_elements, start_values
-from tests.simulated import inputs_of
+from photostrip.strip.gross_errors import control_screening, pair_screening  # noqa: E402
+from photostrip.strip.image_coordinates import corrections  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import orient_pairs  # noqa: E402
+from photostrip.strip.relative_orientation.pairs import collect_pairs  # noqa: E402
+from photostrip.strip.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -222,7 +222,7 @@ class Stopwatch:
 
     def _timed(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
-        def timed(*arguments: Any, **named: Any) -> Any:
+        def timed(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401 (whatever the function takes and gives)
             if self.inside:  # the time belongs to the stage that calls
                 return function(*arguments, **named)
             self.inside = True

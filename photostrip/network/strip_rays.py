@@ -1,5 +1,4 @@
-"""The free network of a formed strip: all its rays, to be adjusted and tested at once.
-"""
+"""The free network of a formed strip: all its rays, to be adjusted and tested at once."""
 
 from __future__ import annotations
 
