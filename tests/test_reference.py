@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import photostrip
-from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.main import COMMANDS
 from tests.loops import nonempty
 from tests.reference import command_page, every_command, plain_fences, python_page
 
