@@ -14,7 +14,7 @@ import typer
 import photostrip
 from photostrip.cli import main as cli
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.threads import THREAD_VARIABLES, limit_threads
+from photostrip.threads import THREAD_VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,10 +76,6 @@ def test_no_command_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixt
 def test_python_m_photostrip_is_the_same_command() -> None:
     done = subprocess.run([sys.executable, "-m", "photostrip", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout == f"photostrip {photostrip.__version__}\n"
-
-
-def test_the_probe_of_loaded_packages_can_see_one() -> None:
-    assert loaded_after("import photostrip, yaml", HEAVY) == {"yaml"}
 
 
 DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample
@@ -247,9 +243,3 @@ def test_one_thread_unless_the_user_says_otherwise() -> None:
     code = "import os, photostrip; print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])"
     assert python(code) == "1 1"
     assert python(code, OPENBLAS_NUM_THREADS="2") == "2 1"
-
-
-def test_limit_threads_leaves_other_variables_alone() -> None:
-    environment = {"MKL_NUM_THREADS": "8", "HOME": "/"}
-    limit_threads(environment)
-    assert environment == dict.fromkeys(THREAD_VARIABLES, "1") | {"MKL_NUM_THREADS": "8", "HOME": "/"}

@@ -24,7 +24,7 @@ from photostrip.cli.commands.compare import compare
 from photostrip.cli.commands.convert import convert
 from photostrip.cli.commands.info import info, sources
 from photostrip.cli.commands.init import init
-from photostrip.cli.commands.plan.plan import plan
+from photostrip.cli.commands.plan import plan
 from photostrip.cli.commands.report import report
 from photostrip.cli.commands.run import run
 from photostrip.cli.commands.schema import schema
@@ -48,7 +48,7 @@ COMMANDS: dict[str, tuple[Command | typer.Typer, str]] = {
     "statement": (statement, "photostrip statement result --class-plan 15 --class-height 20"),
     "compare": (compare, "photostrip compare result baseline.json --tol exact.yaml"),
     "simulate": (simulate, "photostrip simulate strip.yaml -o simulated"),
-    "plan": (plan, "photostrip plan model --overlap 60 --control corners"),
+    "plan": (plan, "photostrip plan model --set end_lap_percent=60 --set control.layout=corners"),
     "step": (step, "photostrip step relative pair.csv -f 153 --base 920 --unit m"),
     "terrestrial": (terrestrial, "photostrip terrestrial displacement survey.yaml -o result"),
     "sources": (sources, "photostrip sources --format md"),

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from photostrip.errors import Fault, InputError
 from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
@@ -81,6 +80,17 @@ class Grid(Section):
     rows: Annotated[Whole, After(bounded(GRID))] = key("Points across the flight", ModelSpec.grid[1])
 
 
+def _listed(value: object) -> object:
+    """Let a list stand for the five elements."""
+    if not isinstance(value, list):
+        return value
+    names = list(ElementErrors.model_fields)
+    if len(value) != len(names):
+        expected = "five: dby, dbz (um), dkappa, dalpha, domega (seconds of arc)"
+        raise wrong(f"{len(value)} values are given", code="number", expected=expected)
+    return dict(zip(names, value, strict=True))
+
+
 class ModelPlanFile(Flown):
     """Expected errors over one model. Every key but the first has a default."""
 
@@ -94,7 +104,13 @@ class ModelPlanFile(Flown):
     control: ModelControl = key("Control", ModelControl())
     grid: Grid = key("Where errors are computed", Grid())
     points: list[ModelPoint] = key("Further points, with names and heights", [])
-    element_errors: ElementErrors = key("Given errors of the elements", ElementErrors())
+    element_errors: Annotated[ElementErrors, Before(_listed)] = key(
+        "Given errors of the elements: by name, or [dby, dbz, dkappa, dalpha, domega]", ElementErrors()
+    )
+    closed_form: Annotated[Words, After(one_of("no", "yes", "printed"))] = key(
+        "Operators and closed form side by side, with c1 to c15; `printed`: as the source prints it, misprints and all",
+        "no",
+    )
 
     @rule
     def _errors_or_misclosures(self) -> None:
@@ -121,22 +137,11 @@ class ModelPlanFile(Flown):
                 raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
 
 
-ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.model_fields)
-
-
-def elements_option(text: str | None) -> dict[str, str]:
-    """Split the five errors of ``--elements`` into keys and values."""
-    values = [] if text is None else text.split(",")
-    if values and len(values) != len(ELEMENT_KEYS):
-        message = f"{len(values)} values are given; the elements are five: dby, dbz, dkappa, dalpha, domega"
-        raise InputError(Fault(message, "number", key="--elements"))
-    return dict(zip(ELEMENT_KEYS, map(str.strip, values), strict=False))
-
-
 class ModelPlan(NamedTuple):
     name: str
     camera: str
     spec: ModelSpec
+    closed_form: str  # ``no``, ``yes`` or ``printed``
     files: Sequence[str]
 
 
@@ -166,7 +171,9 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
         ),
         element_errors=_elements(given.element_errors),
     )
-    return ModelPlan(name=str(given.name), camera=camera.name, spec=spec, files=reading.files)
+    return ModelPlan(
+        name=str(given.name), camera=camera.name, spec=spec, closed_form=str(given.closed_form), files=reading.files
+    )
 
 
 def _control_of(point: ModelControlPoint, number: int) -> ControlPoint:

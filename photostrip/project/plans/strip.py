@@ -63,11 +63,23 @@ def _layout(value: object) -> object:
     return {name.strip(): number.strip()} if equals else {"layout": value}
 
 
-def layout_option(word: str) -> tuple[str, str]:
-    """Return the key and the value that add a layout to a plan: for ``bands=3`` ``layouts."3 bands"`` and the word."""
+def _layouts(value: object) -> object:
+    """Let a list of words stand for layouts, each by a name of its own: ``3 bands``, ``every 5``, ``corners``."""
+    if not isinstance(value, list):
+        return value
+    return {_layout_name(str(word)): word for word in value}
+
+
+def _layout_name(word: str) -> str:
     kind, equals, number = word.partition("=")
-    name = f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
-    return f'layouts."{name if equals else word}"', f'"{word}"'
+    if not equals:
+        return word
+    return f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
+
+
+def _required(value: object) -> object:
+    """Let a pair stand for plan and height."""
+    return dict(zip(("plan", "height"), value, strict=False)) if isinstance(value, list) else value
 
 
 class StripLayout(Section):
@@ -126,13 +138,17 @@ class StripPlanFile(Flown):
         None,
         unit="m",
     )
-    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], length(1)] | None = key(
-        f"Layouts by name; a word may stand for one. Default: {', '.join(DEFAULT_LAYOUTS)}", None
+    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], Before(_layouts), length(1)] | None = key(
+        "Layouts by name, where a word may stand for one, or a list of words: `[bands=3, every=5, corners]`."
+        f" Default: {', '.join(DEFAULT_LAYOUTS)}",
+        None,
     )
     methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], length(1)] = key(
         f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
     )
-    required: StripRequired = key("Accuracy that every point must reach", StripRequired())
+    required: Annotated[StripRequired, Before(_required)] = key(
+        "Accuracy that every point must reach, or [plan, height]", StripRequired()
+    )
     place: StripPlacement | None = key("Further points to be placed as well as possible", None)
 
     @rule

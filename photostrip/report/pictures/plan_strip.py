@@ -34,17 +34,13 @@ def strip_figure(document: Document) -> Figure:
 
 def _curves(axes: Axes, document: Document, name: str) -> None:
     colour = {layout["name"]: SERIES[k % len(SERIES)] for k, layout in enumerate(document["layouts"])}
-    for row in document["accuracy"]:
-        if row["used"] is None:
-            continue
-        axes.plot(
-            range(1, len(row["along"]) + 1),
-            [each[name] for each in row["along"]],
-            color=colour[row["layout"]],
-            linestyle=METHODS[row["method"]],
-            linewidth=1.1,
-            label=f"{row['layout']}, {row['method']}",
-        )
+    curves: dict[tuple[str, str], list[float]] = {}
+    for row in document["along"]:
+        curves.setdefault((row["layout"], row["method"]), []).append(row[name])
+    for (layout, method), values in curves.items():
+        label, line = f"{layout}, {method}", METHODS[method]
+        photos = range(1, len(values) + 1)
+        axes.plot(photos, values, color=colour[layout], linestyle=line, linewidth=1.1, label=label)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("{x:g}")
@@ -62,8 +58,9 @@ def _places(axes: Axes, document: Document) -> None:
     """Draw where the control of each layout lies, one strip below the other."""
     rows = document["geometry"]["rows"]
     layouts = [(layout["name"], layout["points"]) for layout in document["layouts"]]
-    if document["placed"] is not None:
-        layouts.append(("places found", document["placed"]["points"]))
+    layouts += [
+        (row["control"], row["points"]) for row in document.get("placed", ()) if row["control"] == "places found"
+    ]
     for number, (_, points) in enumerate(layouts):
         for use, (marker, _) in USES.items():
             of_use = [point for point in points if point["use"] == use]

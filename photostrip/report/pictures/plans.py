@@ -58,8 +58,8 @@ def _model(document: Document) -> Figure:
             (("raised", "bent by the elements, before levelling"), ("left", "what the absolute orientation leaves")), 3
         ):
             axes = figure.add_subplot(rows, 2, place, aspect="equal")
-            isolines(axes, x, y, _over_grid(bent["points"], f"{name}_z_m", x, y), filled=False)
-            longest = _arrows(axes, bent["points"], name, x, y)
+            isolines(axes, x, y, _over_grid(bent, f"{name}_z_m", x, y), filled=False)
+            longest = _arrows(axes, bent, name, x, y)
             axes.set_title(f"{title}\nheights, m; longest arrow in plan {longest:.2g} m")
             _axes(axes, document["control"])
     return figure
@@ -109,25 +109,6 @@ def _cameras(document: Document) -> Figure:
     return figure
 
 
-def _example(document: Document) -> Figure:
-    rows = document["rows"]
-    figure = new_figure(9, 4, "accuracy of a model: the worked example of the source, µm at photo scale")
-    axes = figure.add_subplot(1, 1, 1)
-    heads = (
-        ("printed_um", "printed"),
-        ("assumed_um", "under its assumptions"),
-        ("rigorous_left_um", "rigorous, left"),
-        ("rigorous_right_um", "rigorous, right"),
-    )
-    for number, (name, label) in enumerate(heads):
-        places = np.arange(len(rows)) + 0.2 * (number - 1.5)
-        bars = axes.bar(places, [row[name] for row in rows], 0.2, label=label, color=SERIES[number])
-        axes.bar_label(bars, fmt="%.0f", fontsize=SMALL_TEXT)
-    axes.set_xticks(range(len(rows)), [f"{row['quantity']}, {row['place']}" for row in rows])
-    axes.legend(fontsize=SMALL_TEXT)
-    return figure
-
-
 def _displacement(document: Document) -> Figure:
     rows = [row for row in document["points"] if row["place"] == "middle"]
     camera = document["camera"]["name"]
@@ -148,7 +129,7 @@ def _displacement(document: Document) -> Figure:
 
 def _screening(document: Document) -> Figure:
     layout = document["layout"]
-    title = f"{document['name']}: {sum(layout['zone_points'])} points, {layout['parallax_sigma_um']:g} µm"
+    title = f"{document['name']}: {sum(layout['zone_points'])} points, {document['parallax_sigma_um']:g} µm"
     figure = new_figure(10, 4.5, title)
     for place, (key, label) in enumerate((("size_um", "error of the y parallax, µm"), ("zone", "zone")), 1):
         axes = figure.add_subplot(1, 2, place, xlabel=label, ylabel="errors found, %", ylim=(0, 105))
@@ -168,8 +149,6 @@ DRAWINGS: dict[str, Callable[[Document], Figure]] = {
     "model": _model,
     "strip": strip_figure,
     "cameras": _cameras,
-    "source-table": _cameras,
-    "model-source-table": _example,
     "displacement": _displacement,
     "screening": _screening,
 }
