@@ -26,7 +26,7 @@ def camera(
         message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
         raise InputError(Fault(message, "plan-cameras", fix="name a YAML file, or use --source-table"))
     if file is None:
-        delivery.require_output()
+        delivery.require_output("camera")
         delivery.deliver(source_document(), ())
     else:
         delivery.plan("camera", file, {})

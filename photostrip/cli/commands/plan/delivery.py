@@ -30,59 +30,46 @@ class Delivery:
     form: Annotated[Form, typer.Option("--format", help="How the answer is printed.")] = "text"
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="Write .svg or .png (a picture), .json, .csv, .md or .txt."
-        ),
+        typer.Option("--output", "-o", metavar="FILE", help="Write .json, .csv, .md, .txt, or of a strip .svg."),
     ] = None
     depfile: RuleOfOutput = None
     quiet: Silent = False
 
-    def require_output(self) -> bool:
-        """Refuse what cannot be written before anything is computed; return whether a picture is wanted."""
+    def require_output(self, kind: str) -> None:
+        """Refuse what cannot be written before anything is computed."""
         require_target(self.depfile, self.output)
-        return self._is_picture()
+        if self.output is None or self.output.suffix.lower() in FORMS or (self._is_picture() and kind == "strip"):
+            return
+        known = ", ".join(FORMS)
+        message = f"no plan of a {kind} is written as '{self.output.suffix}': the name may end in {known}"
+        raise typer.BadParameter(message + ", .svg" * (kind == "strip"), param_hint="--output")
 
     def _is_picture(self) -> bool:
-        from photostrip.report.pictures.plans import check_picture, is_picture
-
-        if self.output is None:
-            return False
-        if is_picture(self.output):
-            check_picture(self.output)
-            return True
-        if self.output.suffix.lower() not in FORMS:
-            known = ", ".join(FORMS)
-            message = f"no plan is written as '{self.output.suffix}': the name may end in .svg, .png, {known}"
-            raise typer.BadParameter(message, param_hint="--output")
-        return False
+        return self.output is not None and self.output.suffix.lower() == ".svg"
 
     def plan(self, kind: str, file: Path | None, options: Options) -> None:
         """Read a plan, compute it, print and write it."""
         from photostrip.library.plan import planned
 
-        self.require_output()
+        self.require_output(kind)
         with self.assigned(options) as assignments:
             plan = planned(kind, file, assignments)
         self.deliver(plan.document, plan.files)
 
-    def deliver(self, document: Document, files: Sequence[str], fine: Document | None = None) -> None:
-        """Print a plan; write it, and the rule for make, when a file is named.
-
-        fine: the plan on a fine grid, for a picture.
-        """
+    def deliver(self, document: Document, files: Sequence[str]) -> None:
+        """Print a plan; write it, and the rule for make, when a file is named."""
         from photostrip.formats.output.plans.table import plan_csv
         from photostrip.report.commands.plans.report import plan_report
 
         rendering = Rendering(plan_report, plan_csv)
         if self.output is not None:
             from photostrip.formats.text.writing import write_text
-            from photostrip.report.pictures.plans import plan_picture
+            from photostrip.report.pictures.plan_strip import strip_plan_picture
 
-            ending = self.output.suffix
             if self._is_picture():
-                write_text(self.output, plan_picture(fine or document, ending))
+                write_text(self.output, strip_plan_picture(document).file())
             else:
-                write_text(self.output, rendering.rendered(document, FORMS[ending.lower()]))
+                write_text(self.output, rendering.rendered(document, FORMS[self.output.suffix.lower()]))
         if self.output is None or not self.quiet:
             rendering.show(document, self.form)
         write_rule(self.depfile, self.output, files)

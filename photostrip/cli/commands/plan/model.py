@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
+from typing import Annotated
 
 import typer
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
-from photostrip.cli.stdout import Document
-
-if TYPE_CHECKING:
-    from photostrip.planning.model.plan import ModelSpec
-
-FINE = 41  # points along and across of a picture
 
 
 @dataclass(frozen=True)
@@ -67,7 +61,7 @@ def model(
         message = "the printed form stands beside the closed form: give --closed-form as well"
         raise typer.BadParameter(message, param_hint="--as-printed")
     options = {**camera.keys(), **flight.keys(), **control.keys()}
-    drawn = delivery.require_output()
+    delivery.require_output("model")
     if source_table:
         if file is not None or any(value is not None for _, value in options.values()):
             message = "the worked example of the source has its own numbers: nothing else goes with it"
@@ -77,11 +71,6 @@ def model(
     with delivery.assigned(options) as assignments:
         given = load_model_plan(file, assignments)
     forms = both_forms(given.spec) if closed_form else None
-
-    def planned(spec: ModelSpec) -> Document:
-        forecast = plan_model(spec)
-        return model_document(given.name, given.camera, forecast, given_errors(spec), forms, printed=as_printed)
-
-    document = planned(given.spec)
-    fine = planned(replace(given.spec, grid=(FINE, FINE))) if drawn else None
-    delivery.deliver(document, given.files, fine)
+    forecast, errors = plan_model(given.spec), given_errors(given.spec)
+    document = model_document(given.name, given.camera, forecast, errors, forms, printed=as_printed)
+    delivery.deliver(document, given.files)
