@@ -3,7 +3,7 @@
 - ``command_table``: all commands, and ``photostrip --help``; ``options``: options that several commands share;
 - ``stdout``: what is printed, in which form; ``stderr``: what is said meanwhile;
 - ``failures``: which exit code a failure has, and how it is reported;
-- ``option_groups``, ``section_option``, ``typed_values``, ``documents``, ``whole_program``: what options and answers of
-  several commands have in common;
+- ``option_groups``, ``section_option``, ``typed_values``, ``documents``, ``sheets``, ``whole_program``: what options
+  and answers of several commands have in common;
 - ``jobs``: what is too long for the file of its command: a batch, the baseline, manual pages.
 """

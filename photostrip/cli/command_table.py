@@ -50,7 +50,7 @@ _TEXTS = (
     (
         "plan",
         "Expected accuracy and design, before any photo is taken.",
-        "photostrip plan model --overlap 60 --control corners",
+        "photostrip plan model --set end_lap_percent=60 --set control.layout=corners",
     ),
     (
         "step",
@@ -77,7 +77,6 @@ _TEXTS = (
 )
 _MODULES = {
     "completion": "shell",
-    "plan": "plan.plan",
     "sources": "info",
 }  # where it is not that of the command's name
 COMMANDS = {

@@ -416,14 +416,14 @@ def settings(project: ProjectFile) -> Settings:
         ),
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,
-        tolerances={name: limit for name, limit in project.tolerances.values().items() if limit is not None},
+        tolerances={name: limit for name, limit in project.tolerances if limit is not None},
         accept=tuple(map(str, project.accept)),
     )
 
 
 def _laid_over(usual: T, given: Section) -> T:
     """Replace the fields of settings by the keys of a section that has the same names."""
-    changed = given.values()
+    changed = dict(given)
     for name, value in changed.items():
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))

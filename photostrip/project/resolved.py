@@ -82,7 +82,7 @@ def completed(project: ProjectFile, root: Node, path: str, measured: Sequence[st
         if (each := getattr(project, name)) is not None
     }
     spec = output_spec(project.output, first_frame(project)) or first_frame(project)
-    ellipsoid = None if spec.ellipsoid is None else Ellipsoid(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
+    ellipsoid = None if spec.ellipsoid is None else Ellipsoid.model_construct(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
     output = project.output.changed(
         crs=Text(spec.crs),
         axes=spec.axes,
@@ -137,7 +137,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     """Turn sections into mappings, without keys that say nothing."""
     if isinstance(value, Section):
         skipped = ("k0", "k", "p", "b") if isinstance(value, Distortion) and value.model == "radial-table" else ()
-        fields = ((name, getattr(value, name)) for name in type(value).keys if name not in skipped)
+        fields = ((name, each) for name, each in value if name not in skipped)
         return {
             name: "auto" if each is None else _plain(each)
             for name, each in fields

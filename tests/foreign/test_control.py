@@ -158,27 +158,6 @@ def test_heights_of_opendronemap_that_are_not_known(tmp_path: Path, unknown: str
     assert block.run()["verdict"]["look_at"] == []
 
 
-def test_wrong_control_is_named_although_the_start_lies_on_it(tmp_path: Path) -> None:
-    block = Block(tmp_path)
-    five = ["G01", "G02", "G03", "G04", "G05"]
-    block.marks = [row for row in block.marks if row["point"] in five or row["point"].startswith("K")]
-    assert block.convert(block.odm(), *SIGMA) == 0
-    sound = places(block.run())
-    one, other = block.control["G01"], block.control["G04"]
-    block.control |= {"G01": other, "G04": one}
-    assert block.convert(block.odm(), *SIGMA, "--force") == 0
-    exchanged = block.run()
-    assert "P408 given points G01 and G04 fit when their coordinates are exchanged" in told(exchanged)
-    block.control |= {"G01": {**one, "y": str(float(one["y"]) + 1000.0)}, "G04": other}
-    assert block.convert(block.odm(), *SIGMA, "--force") == 0
-    far = block.run()
-    assert "G01" in told(far)
-    assert "+1000" in told(far)
-    for result in (exchanged, far):
-        at = places(result)
-        assert all(at[name] == pytest.approx(sound[name], abs=0.2) for name in at if name.startswith("CHK-"))
-
-
 def told(document: dict[str, Any]) -> str:
     """Give what is to be looked at, in one text."""
     return " ".join(each if isinstance(each, str) else each["message"] for each in document["verdict"]["look_at"])
@@ -203,20 +182,6 @@ def test_a_precision_of_marks_of_their_own(tmp_path: Path) -> None:
     assert all(row.endswith(",,") for row in nonempty(row for row in rows[1:] if ",colmap-" in row))
     assert sum(row.endswith(",1.5,1.5") for row in rows) == len(block.marks)
     assert block.run()["verdict"]["look_at"] == []
-
-
-def test_marks_on_other_photos_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    block = Block(tmp_path)
-    lost = [row for row in block.marks if row["photo"] == "1001"]
-    for row in lost:
-        row["photo"] = "elsewhere"
-    assert block.convert(block.odm(), *SIGMA) == 0
-    assert f"{len(lost)} marks on photos that the block does not have: elsewhere.JPG" in capsys.readouterr().out
-    for row in block.marks:
-        row["photo"] = "elsewhere"
-    (tmp_path / "block" / "project.yaml").unlink()
-    assert block.convert(block.odm(), *SIGMA, "--force") == 2
-    assert "none of its photos is in the block: elsewhere.JPG; the block has flight/1001.JPG" in capsys.readouterr().err
 
 
 def test_what_the_table_does_not_say_is_asked_for_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -88,21 +88,6 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
         assert at[point]["sigma_z"] == pytest.approx(expected[point]["sigma_z"], abs=3e-4)
 
 
-def test_it_says_which_event_each_photo_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = model().write_text(tmp_path / "model")  # photos DJI 0.JPG to DJI 3.JPG
-    events = tmp_path / "Timestamp.MRK"
-    events.write_text("\n".join(mrk(n, place) for n, place in enumerate(small(6))), encoding="utf-8")
-    assert convert(source, tmp_path / "numbered", "--positions", str(events)) == 0
-    said = capsys.readouterr().out
-    assert "4 events of DJI, by the number in the photo's name: DJI 0.JPG is line 1; WGS 84" in said
-    assert "2 of them without fixed ambiguities" in said
-    rows = (tmp_path / "numbered" / "positions.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[:2] == ["photo,x,y,z,sx,sy,sz", "DJI 0.JPG,16.475,47.643,512.9,0.02,0.03,0.05"]
-    events.write_text("\n".join(mrk(n + 8, place) for n, place in enumerate(small())), encoding="utf-8")
-    assert convert(source, tmp_path / "ordered", "--positions", str(events)) == 0
-    assert "in the order of the photos' names: DJI 0.JPG is line 1" in capsys.readouterr().out
-
-
 # ---------------------------------------------------------------------------------------------------- refusals
 
 WRONG: dict[str, tuple[list[str], str]] = {

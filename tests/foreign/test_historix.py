@@ -58,21 +58,6 @@ def test_the_camera_keeps_its_numbers_and_its_marks(tmp_path: Path, capsys: pyte
     assert rows[1] == "ARBCSRD00010006.tif,cg01,4703.34,2196.9"
 
 
-def test_marks_may_be_missing(tmp_path: Path) -> None:
-    source = copied(tmp_path / "historix")
-    file = source / FILES[0]
-    head, row = file.read_text(encoding="utf-8").splitlines()
-    cells = [cell if place not in range(2, 10) else "" for place, cell in enumerate(row.split(","))]
-    file.write_text(f"{head}\n{','.join(cells)}\n", encoding="utf-8")
-    assert convert(source, tmp_path / "corners", *OPTIONS, "-q") == 0
-    assert (tmp_path / "corners" / "project.yaml").read_text(encoding="utf-8").count("midside_") == 0
-    file.write_text(
-        "focal_length,pixel_pitch,principal_point_x_mm,principal_point_y_mm\n152.865,0.025,0,0\n", encoding="utf-8"
-    )
-    assert convert(source, tmp_path / "none", *OPTIONS, "-q") == 0
-    assert "fiducials" not in (tmp_path / "none" / "project.yaml").read_text(encoding="utf-8")
-
-
 # ---------------------------------------------------------------------------------------------------- refusals
 
 
@@ -90,14 +75,6 @@ def test_what_the_files_do_not_carry_is_asked_for(
     place = OPTIONS.index(missing)
     options = OPTIONS[:place] + OPTIONS[place + 2 :]
     assert expected in refused(capsys, copied(tmp_path / "historix"), tmp_path / "block", *options)
-
-
-def test_without_control_nothing_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = copied(tmp_path / "historix")
-    (source / "gcp.csv").rename(tmp_path / "marks.csv")
-    told = refused(capsys, source, tmp_path / "block", *OPTIONS[:4])
-    assert "nothing is measured on these photos; give --control FILE" in told
-    assert convert(source, tmp_path / "block", *OPTIONS, "--control", str(tmp_path / "marks.csv"), "-q") == 0
 
 
 WRONG: dict[str, tuple[str, str, str, str]] = {
@@ -149,20 +126,6 @@ def test_a_distortion_has_no_unit_there(tmp_path: Path, capsys: pytest.CaptureFi
     assert "nothing says in which unit k1 is" in refused(capsys, source, tmp_path / "block", *OPTIONS)
     (source / FILES[0]).write_text(f"{head}\n{row}\n{row}\n", encoding="utf-8")
     assert "2 cameras, and nothing says which photo has which" in refused(capsys, source, tmp_path / "block", *OPTIONS)
-
-
-def test_options_are_for_what_asks_for_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = copied(tmp_path / "historix")
-    told = refused(capsys, source, tmp_path / "block", *OPTIONS, "--pixel-size", "0.02")
-    assert f"{FILES[0]}: --pixel-size: says how large a pixel is, by its pixel_pitch; leave it out" in told
-    told = refused(capsys, source, tmp_path / "block", "--image-size", "10000", *OPTIONS[2:])
-    assert "--image-size: `10000` is no size; expected width and height in pixels" in told
-    told = refused(capsys, source, tmp_path / "block", *OPTIONS[:2], "--positions-sigma", "1,2", *OPTIONS[4:])
-    assert "--positions-sigma: `1,2` is no precision" in told
-    model = tmp_path / "model"
-    model.mkdir()
-    (model / "cameras.txt").touch()
-    assert "--image-size: is of no use here" in refused(capsys, model, tmp_path / "block", *OPTIONS[:2])
 
 
 # ----------------------------------------------------------------------------------------------------- damage

@@ -67,29 +67,6 @@ def test_ground_control_points_come_in_with_their_marks(tmp_path: Path, capsys: 
         assert (x, y, at[point]["z"]) == pytest.approx([expected[point][name] for name in "xyz"], abs=3e-4)
 
 
-def test_points_without_position_are_tie_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    rays = [{"shot_id": f"DJI {n}.JPG", "projection": [0.01 * n, 0.02]} for n in range(3)]
-    place = {"latitude": 49.2, "longitude": 15.3}
-    points = [{"id": "T", "observations": rays}, {"id": "G", "position": place, "observations": rays}]
-    control = tmp_path / "gcp.json"
-    control.write_text(json.dumps({"points": points}), encoding="utf-8")
-    assert convert(source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1") == 0
-    assert "13 points, 51 rays" in capsys.readouterr().out
-    assert (tmp_path / "block/control.csv").read_text().splitlines()[1:] == ["G,15.3,49.2,,xy,control,0.1,0.1,0.1"]
-    rows = (tmp_path / "block/observations.csv").read_text().splitlines()
-    assert rows[-6:-3] == ["DJI 0.JPG,T,2750.0,1943.5", "DJI 1.JPG,T,2805.0,1943.5", "DJI 2.JPG,T,2860.0,1943.5"]
-
-
-def test_of_several_reconstructions_the_largest_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    whole, rays = small()
-    part = {**whole, "shots": {"DJI 3.JPG": whole["shots"].pop("DJI 3.JPG")}}
-    assert convert(write(tmp_path / "opensfm", [part, whole], rays), tmp_path / "block") == 0
-    said = capsys.readouterr().out
-    assert "3 photos of 1 camera" in said
-    assert "1 smaller reconstruction of 1 photo; 1 photo of the tracks without a pose: DJI 3.JPG" in said
-
-
 @pytest.mark.parametrize("kind", ["perspective", "simple_radial", "radial"])
 def test_other_cameras_keep_their_numbers(tmp_path: Path, kind: str) -> None:
     whole, rays = small()
@@ -167,16 +144,6 @@ def test_what_is_no_such_file_is_refused(
     source = write(tmp_path / "opensfm", [whole], rays)
     (source / name).write_bytes(data)
     assert expected in refused(capsys, source, tmp_path / "block")
-
-
-def test_a_folder_must_have_each_file_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    (source / "tracks.csv").rename(source / "tracks_old.csv")
-    (source / "tracks_new.csv").write_bytes((source / "tracks_old.csv").read_bytes())
-    assert "has tracks_new.csv, tracks_old.csv: one tracks.csv is read" in refused(capsys, source, tmp_path / "block")
-    for file in source.glob("tracks*"):
-        file.unlink()
-    assert "has no tracks.csv, which a reconstruction of OpenSfM needs" in refused(capsys, source, tmp_path / "block")
 
 
 def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,6 @@ from photostrip.planning.camera_efficiency import (
     ComparedCamera,
     FlownSurvey,
     HighGround,
-    by_efficiency,
     compare,
     sigma_from_distortion,
     sigma_from_mean_distortion,
@@ -41,34 +40,10 @@ def test_numbers_computed_apart(vector: Vector) -> None:
     assert [camera.height_ratio for camera in cameras] == pytest.approx(want["H_over_mh"], rel=1e-12)
 
 
-@pytest.mark.parametrize("vector", cases("camera_efficiency", "camera-efficiency-general"))
-def test_other_formats(vector: Vector) -> None:
-    x = vector.input
-    first, second = (ComparedCamera("", x[f"f{k}"], x[f"mp{k}"], x[f"b{k}"], x[f"l{k}"]) for k in (1, 2))
-    found = compare(first, second)
-    assert found.printed_area == pytest.approx(vector.expected["as_printed"], rel=1e-12)
-    assert found.area == pytest.approx(vector.expected["true_area_ratio"], rel=1e-12)
-
-
 def flown(camera: ComparedCamera, m_h: float) -> float:
     """Ground area of a model, flown as high as a standard deviation of heights allows: m_h = H m_p / b."""
     scale = m_h * camera.base / camera.sigma / camera.focal
     return camera.base * scale * camera.width * scale
-
-
-def test_the_area_needs_the_scale_squared() -> None:
-    first, second = ComparedCamera("a", 70, 0.017, 60, 130), ComparedCamera("b", 200, 0.011, 75, 160)
-    found = compare(first, second)
-    assert flown(first, 0.2) / flown(second, 0.2) == pytest.approx(found.area)
-    assert abs(found.printed_area / found.area - 1) > 0.3  # eq. 2 as printed is no ratio of areas
-    assert found.photos * found.area == pytest.approx(1)
-
-
-def test_height_errors_at_equal_area() -> None:
-    first, second = ComparedCamera("a", 70, 0.017, 60, 130), ComparedCamera("b", 200, 0.011, 75, 160)
-    # m_h in proportion to the scale; the area to its square
-    m_h = [1.0 / np.sqrt(flown(camera, 1.0)) for camera in (first, second)]
-    assert compare(first, second).height_error == pytest.approx(m_h[0] / m_h[1])
 
 
 def test_the_printed_table_and_its_misprints() -> None:
@@ -89,31 +64,6 @@ def test_the_printed_table_and_its_misprints() -> None:
     assert ratios[3] == pytest.approx(1.09, abs=0.002)
     assert 5000 * last.sigma == pytest.approx(55)  # mm: it would need this base
     assert PRINTED_BASE == 60
-
-
-def test_eq_5_as_printed_contradicts_the_definition() -> None:
-    # printed with garbled indices; H1 m_p1 b2 / (b1 H2 m_p2) is what m_h = H m_p / b says
-    first, second, heights = (
-        ComparedCamera("a", 70, 0.017, 60, 130),
-        ComparedCamera("b", 200, 0.011, 75, 130),
-        (900.0, 1500.0),
-    )
-    m_h = [h * c.sigma / c.base for h, c in zip(heights, (first, second), strict=True)]
-    assert m_h[0] / m_h[1] == pytest.approx(
-        heights[0] * first.sigma * second.base / (first.base * heights[1] * second.sigma)
-    )
-
-
-def test_the_best_camera_is_that_of_the_largest_area_at_equal_heights() -> None:
-    cameras = [
-        ComparedCamera("a", 70, 0.017, 60, 130),
-        ComparedCamera("b", 200, 0.011, 75, 160),
-        ComparedCamera("c", 150, 0.003, 92, 230),
-    ]
-    assert [c.name for c in by_efficiency(cameras)] == sorted(
-        "abc", key=lambda name: -flown(next(c for c in cameras if c.name == name), 1.0)
-    )
-    assert [c.focal for c in by_efficiency(source_cameras())] == [70, 100, 140, 200]
 
 
 # --------------------------------------------------------------------------------- distortion, ground and what it costs
@@ -189,18 +139,3 @@ def test_the_steepest_slope_is_that_which_the_outermost_ray_grazes() -> None:
         slope = steepest + change
         normal = np.array([0.0, 0.0, np.cos(slope)]) + away * np.sin(slope)  # a slope that falls away from the photo
         assert (ray @ normal < 0) is np.bool_(seen)
-
-
-def test_the_least_principal_distance_just_takes_the_terrain() -> None:
-    for terrain in (
-        HighGround(relief=500.0),
-        HighGround(slope=np.radians(55.0)),
-        HighGround(relief=300.0, slope=np.radians(40)),
-    ):
-        survey = FlownSurvey(scale=8000.0, terrain=terrain)
-        least = suitability(FILM, survey).least_focal
-        assert suitability(FILM._replace(focal=least * 1.0001), survey).suits
-        assert not suitability(FILM._replace(focal=least * 0.9999), survey).suits
-    # at a given flying height the principal distance does not change what relief asks for
-    too_much = FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))
-    assert suitability(FILM, too_much).least_focal == np.inf

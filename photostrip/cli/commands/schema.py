@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
+
+from photostrip.planning import PlanKind
 
 
 def schema(
@@ -13,7 +15,7 @@ def schema(
         bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
     ] = False,
     plan: Annotated[
-        Literal["model", "strip", "camera", "displacement", "screening"] | None,
+        PlanKind | None,
         typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
     ] = None,
     tolerances: Annotated[

@@ -14,7 +14,7 @@ from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
 from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
 from photostrip.project.schema.values import Id, Number, Positive, Range, Words, bounded, one_of
 from photostrip.units import MICROMETRES
 
@@ -37,12 +37,12 @@ class PlanCamera(Section):
     base: Positive | None = key("Photo base; default: from `format` and the overlap", None, unit="mm")
     format: tuple[Positive, Positive] | None = key("Length along and width across the flight", None, unit="mm")
 
-    @Rule
+    @rule
     def _has_a_base(self) -> None:
         if self.base is None and self.format is None:
             raise wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
 
-    @Rule
+    @rule
     def _has_one_precision(self) -> None:
         if (self.sigma_um is None) == (self.image_sigma_um is None):
             what = "nothing says" if self.sigma_um is None else "two keys say"
@@ -74,9 +74,9 @@ class CameraPlanFile(Section):
     relief: Relief = key("Difference between the highest and the lowest ground", 0.0, unit="m")
     slope_deg: Slope = key("Steepest slope that is to be seen", 0.0, unit="deg")
     reference: Id | None = key("Camera that the others stand beside; default: the last", None)
-    cameras: Annotated[dict[Id, PlanCamera], Length(1)] = key("Cameras by name")
+    cameras: Annotated[dict[Id, PlanCamera], length(1)] = key("Cameras by name")
 
-    @Rule
+    @rule
     def _reference_is_there(self) -> None:
         if self.reference is not None and self.reference not in self.cameras:
             expected = f"one of {', '.join(self.cameras)}"
@@ -89,7 +89,7 @@ class CameraPlanFile(Section):
             message = f"camera `{lacking}` has no format, and others have: areas cannot be compared"
             raise wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
 
-    @Rule
+    @rule
     def _flown_one_way(self) -> None:
         given = [name for name in FLOWN if getattr(self, name) is not None]
         if len(given) > 1:

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
-from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
 from photostrip.project.schema.values import Fraction, Number, Range, Words, bounded, one_of
 from photostrip.project.terrestrial.cameras import Distance, Size
 from photostrip.project.terrestrial.options import chosen_camera, required_format
@@ -41,7 +41,7 @@ class DisplacementPlanFile(Section):
     convergence_deg: Annotated[Number, After(bounded(CONVERGENCE))] = key(
         "Turn of each camera towards the other", 0.0, unit="deg"
     )
-    distances: Annotated[list[Metres], Length(1, 50)] = key(
+    distances: Annotated[list[Metres], length(1, 50)] = key(
         "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
     )
     sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
@@ -53,7 +53,7 @@ class DisplacementPlanFile(Section):
         "Probability with which the displacements stated are found", DisplacementSpec.power
     )
 
-    @Rule
+    @rule
     def _one_precision(self) -> None:
         if self.sigma_um is not None and self.sigma_d_um is not None:
             message = "the standard deviation of a coordinate and that of a pseudo-parallax are both given"

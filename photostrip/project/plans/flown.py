@@ -13,7 +13,7 @@ from typing import Annotated, TypeVar
 from photostrip.camera import Camera
 from photostrip.formats.text.findings import Findings
 from photostrip.planning.strip.ideal_strip import StripGeometry
-from photostrip.project.schema.sections import After, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Section, key, rule, wrong
 from photostrip.project.schema.values import Positive, Range, Triple, Words, bounded
 from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
@@ -56,7 +56,7 @@ class Flown(Section):
     flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
     image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
 
-    @Rule
+    @rule
     def _one_scale(self) -> None:
         if self.scale is not None and self.flying_height is not None:
             raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
@@ -70,7 +70,7 @@ class Flown(Section):
 def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, Reading]:
     """Read a plan file, or make one of assignments alone, or raise every fault."""
     if path is None:
-        place, number = Place(COMMAND_LINE), next(name for name in kind.keys if name in NUMBER_KEYS)
+        place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name in NUMBER_KEYS)
         root = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
         reading = Reading(file=COMMAND_LINE, root=root, findings=Findings(), files=[])
     else:

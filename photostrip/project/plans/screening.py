@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
-from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
 from photostrip.project.schema.values import (
     Fraction,
     NotNegative,
@@ -45,7 +45,7 @@ class ScreeningPlanFile(Section):
     )
     base: Size = key("Photo base", USUAL.layout.base, unit="mm")
     width: Size = key("Distance of the side zones from the base", USUAL.layout.width, unit="mm")
-    zone_points: Annotated[list[Count], Length(ZONES, ZONES)] = key(
+    zone_points: Annotated[list[Count], length(ZONES, ZONES)] = key(
         "Points in each of the standard zones 1 to 6", list(USUAL.layout.counts)
     )
     zone_reach: NotNegative = key(
@@ -62,10 +62,10 @@ class ScreeningPlanFile(Section):
     second_errors: Annotated[Whole, After(bounded(Range(0, 1000, "")))] = key(
         "Pairs of them that have a second one", USUAL.second
     )
-    error_sizes_um: Annotated[list[Positive], Length(1, 20)] = key(
+    error_sizes_um: Annotated[list[Positive], length(1, 20)] = key(
         "Sizes of the errors, each as often as any other", [MICROMETRES * size for size in USUAL.sizes], unit="um"
     )
-    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], Length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], length(1)] = key(
         "Methods, of `processing.relative.screening`", list(USUAL.methods)
     )
     grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL.grubbs_alpha)
@@ -75,7 +75,7 @@ class ScreeningPlanFile(Section):
     )
     seed: Whole = key("Number that makes the drawn pairs and errors the same again", USUAL.seed)
 
-    @Rule
+    @rule
     def _errors_have_pairs(self) -> None:
         if self.second_errors > self.models:
             message = f"{self.second_errors} second errors do not go into {self.models} pairs"

@@ -8,7 +8,7 @@ from typing import Annotated
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.project.schema.sections import After, Length, Section, key
+from photostrip.project.schema.sections import After, Section, key, length
 from photostrip.project.schema.values import Id, Number, Words, bounded, one_of
 from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
 from photostrip.project.yaml.parsing import parse, read_document
@@ -37,7 +37,7 @@ class PresetFile(Section):
     """A list of cameras."""
 
     photostrip_cameras: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
-    cameras: Annotated[dict[Id, Preset], Length(1)] = key("Cameras by name")
+    cameras: Annotated[dict[Id, Preset], length(1)] = key("Cameras by name")
 
 
 def own_presets() -> dict[str, Phototheodolite]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
 from photostrip.project.schema.values import Axes, Id, Number, Positive, Words, YAxis, bounded, one_of
 from photostrip.project.terrestrial.cameras import Distance, Place, Size
 from photostrip.project.terrestrial.ranges import (
@@ -51,7 +51,7 @@ class Camera(Section):
     )
     format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
 
-    @Rule
+    @rule
     def _has_a_principal_distance(self) -> None:
         if self.preset is None and self.principal_distance is None:
             expected = "`preset`, or `principal_distance` in mm"
@@ -80,7 +80,7 @@ class Station(Section):
         "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
     )
 
-    @Rule
+    @rule
     def _is_complete(self) -> None:
         turned = [name for name in ("alpha", "omega", "kappa") if getattr(self, name) is not None]
         if self.directions is not None and turned:
@@ -128,7 +128,7 @@ class Measurements(Section):
         "Standard deviation of a pseudo-parallax in rows without one; default: `sigma`", None, unit="unit"
     )
 
-    @Rule
+    @rule
     def _one_table(self) -> None:
         if (self.coordinates is None) == (self.pseudo_parallaxes is None):
             what = "two tables are named" if self.coordinates is not None else "no table is named"
@@ -161,7 +161,7 @@ class TerrestrialFile(Section):
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the survey", "displacements")
     presets: Words | None = key("A list of cameras of your own", None)
-    cameras: Annotated[dict[Id, Camera], Length(1)] = key("Cameras by name")
+    cameras: Annotated[dict[Id, Camera], length(1)] = key("Cameras by name")
     stations: Stations = key("The two stations")
     axes: Annotated[Axes, After(_ground_axes)] | None = key(
         "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
@@ -178,7 +178,7 @@ class TerrestrialFile(Section):
     stable: list[Id] = key("Points that are taken not to move", [])
     processing: Processing = key("How displacements are tested", Processing())
 
-    @Rule
+    @rule
     def _one_geometry(self) -> None:
         left, right = self.stations.left, self.stations.right
         if left.free != right.free:

@@ -121,7 +121,7 @@ def test_the_schema_has_every_key(
     code, out, err = call(capsys, "schema", *option)
     schema = json.loads(out)
     assert (code, err) == (0, "")
-    assert set(schema["properties"]) == set(kind.keys)
+    assert set(schema["properties"]) == set(kind.model_fields)
     described = [(name, key) for block in _blocks(schema) for name, key in block["properties"].items()]
     assert len(described) > 50
     assert [name for name, key in described if not key.get("description")] == []

@@ -162,35 +162,6 @@ def test_parts_of_a_strip_have_the_covariances_of_the_whole(doubt: float) -> Non
         )
 
 
-def test_the_operator_makes_the_correction_that_was_made() -> None:
-    """Parameters times misclosures of a noisy strip are what the run subtracted."""
-    wanted = settings("3")
-    inputs = without_noise(spec(9))
-    rng = np.random.default_rng(4)
-    noisy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
-    result = triangulate(replace(inputs, observations=replace(inputs.observations, xy=noisy)), wanted)
-    (strip,) = result.strips
-    found = fitted_strip(result)
-    similar = strip.absolute.similarity(strip.formed.xyz)
-    given = strip.absolute.misclosures[found.control.point, found.control.axis]
-    moved = similar - found.fit.influence(found.xyz) @ (found.fit.operator @ given)
-    assert moved == pytest.approx(strip.xyz, abs=1e-6)
-
-
-def test_a_photo_goes_where_all_its_points_go() -> None:
-    """Points that move together take the photo with them: the sum over its points is a motion of the whole."""
-    result = triangulate(without_noise(spec(6)), settings("similarity"))
-    errors = fitted_strip(result).errors
-    centers = result.strips[0].of_photos.resection.centers - errors.origin
-    by = photo_errors(result.strips[0], errors, result.refined.observations)
-    together = similarity_derivatives(errors.xyz, np.zeros(3)).reshape(-1, 7)
-    photos = (by.by_point @ together).reshape(6, 6, 7)
-    assert photos[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert photos[:, :3, 6] == pytest.approx(centers, abs=1e-6)
-    assert photos[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert photos[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
 def test_points_without_a_model_have_rows_too(adjustment: str) -> None:

@@ -15,7 +15,7 @@ from photostrip.strip.relative_orientation import six_points
 from photostrip.strip.relative_orientation.solution import solve_elements
 from tests.loops import nonempty
 from tests.strips import attitude, batch
-from tests.vectors import cases, section
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 LENGTHS = st.floats(40.0, 300.0)
 SMALL = st.floats(-0.02, 0.02)
-TILTS = st.floats(-0.6, 0.6)
-KAPPAS = st.floats(-np.pi, np.pi)
 
 
 SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
@@ -135,23 +133,6 @@ def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     assert np.allclose(base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
 
 
-def test_all_examples_are_here() -> None:
-    assert [len(section(name)) for name in ("gruber_six_points", "base_chain")] == [2, 2]
-
-
-@given(LENGTHS, LENGTHS, LENGTHS, st.lists(st.floats(-1, 1), min_size=6, max_size=6))
-def test_the_closed_forms_are_the_linear_least_squares(f: float, a: float, b: float, q: list[float]) -> None:
-    jacobian = design(standard_points(a, b), f, b)
-    found = orient_six_points(q, f, a, b)
-    solution, *_ = np.linalg.lstsq(jacobian, -np.array(q), rcond=None)
-    size = np.abs(solution).max() + 1e-12
-    assert np.allclose(found.elements, solution, rtol=0, atol=1e-9 * size)
-    assert np.allclose(found.residuals, np.array(q) + jacobian @ solution, rtol=0, atol=1e-9)
-    assert found.sigma == pytest.approx(np.linalg.norm(found.residuals), abs=1e-9)
-    inverse = np.linalg.inv(jacobian.T @ jacobian)
-    assert np.allclose(six_points.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
-
-
 @given(LENGTHS, LENGTHS)
 def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
     f = 153.0
@@ -189,32 +170,3 @@ def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
     assert (
         np.abs(rigorous[0] - linear).max() < 10 * np.abs(elements).max() ** 2 + 1e-9
     )  # what is left is of second order
-
-
-@given(st.tuples(TILTS, KAPPAS, TILTS, TILTS, KAPPAS))
-def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
-    direction, rotation = dependent_pair(elements)
-    again = base_elements(direction * 7.0, rotation)
-    difference = (again - elements + np.pi) % (2 * np.pi) - np.pi
-    assert np.abs(difference).max() < 1e-13
-    assert np.linalg.norm(direction) == pytest.approx(1, abs=1e-15)
-
-
-def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
-    b, step = 92.0, 1e-5
-    t = six_points.dependent_from_base(b)
-    for number in range(5):
-        elements = np.zeros(5)
-        elements[number] = step
-        direction, rotation = dependent_pair(elements)
-        dalpha, domega, dkappa = alpha_omega_kappa(rotation)
-        found = [b * direction[1] / direction[0], b * direction[2] / direction[0], dkappa, dalpha, domega]
-        assert np.allclose(found, t[:, number] * step, rtol=0, atol=1e-7 * step * b)
-
-
-def test_many_pairs_at_once() -> None:
-    elements = np.random.default_rng(1).uniform(-0.3, 0.3, (4, 3, 5))
-    direction, rotation = dependent_pair(elements)
-    assert direction.shape == (4, 3, 3)
-    assert rotation.shape == (4, 3, 3, 3)
-    assert np.allclose(base_elements(direction, rotation), elements, rtol=0, atol=1e-14)
