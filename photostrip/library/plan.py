@@ -67,15 +67,10 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
             from photostrip.sheets.model_plan import model_sheet
 
             model = load_model_plan(path, assignments)
-            forms, printed = (
-                None if model.closed_form == "no" else both_forms(model.spec),
-                model.closed_form == "printed",
-            )
-            errors = given_errors(model.spec)
-            return Plan(
-                model_sheet(model.name, model.camera, plan_model(model.spec), errors, forms, printed=printed),
-                model.files,
-            )
+            spec, printed = model.spec, model.closed_form == "printed"
+            forms = None if model.closed_form == "no" else both_forms(spec)
+            forecast, errors = plan_model(spec), given_errors(spec)
+            return Plan(model_sheet(model.name, model.camera, forecast, errors, forms, printed=printed), model.files)
         case "strip":
             from photostrip.project.plans.strip import load_strip_plan
             from photostrip.sheets.strip_plan import strip_sheet

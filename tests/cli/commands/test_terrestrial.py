@@ -529,7 +529,7 @@ def test_displacements_are_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[s
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0.1", "--step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --sigma-um 0", "--sigma-um: 0 is out of range; expected 0.001 to 10000 µm"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --as-printed --omega 3", "--as-printed: the printed formulas hold for a level camera; leave out --omega and --kappa"),
-        ("directions accuracy --principal-distance 100 --photo-format 100,80 --plot p.png", "p.png: --plot: pictures are written as SVG; expected a name that ends in .svg"),
+        ("displacement x.yaml --plot p.png", "p.png: --plot: pictures are written as SVG; expected a name that ends in .svg"),
         ("directions theodolite --sigma-arcsec -1 --principal-distance 100", "--sigma-arcsec: -1 is out of range; expected 0.0001 to 36000 ″"),
         ("directions orient sights.csv --principal-distance 100 --free f", "--free: `f` cannot be determined; expected principal-distance, principal-point, refraction, or several with commas between"),
         ("directions orient sights.csv --principal-distance 100 --significance 1", "--significance: 1 is out of range; expected 1e-06 to 0.5"),
