@@ -55,23 +55,6 @@ def test_the_level_along_a_strip() -> None:
     assert normal_quantile(1 - i * q / (left + i * q) / 2) == pytest.approx(3.68, abs=0.08)
 
 
-def test_the_single_ray_of_a_control_point_comes_back(problem: BundleProblem) -> None:
-    at = int(problem.control.point[np.isfinite(problem.control.sigma).all(axis=1)][0])
-    only = rays_of(problem, at)[0]
-    images = problem.images
-    left = (images.point != at) | (np.arange(len(images)) == only)
-    alone = replace(
-        problem, images=type(images)(images.photo[left], images.point[left], images.xy[left], images.sigma[left])
-    )
-    (row,) = rays_of(alone, at)
-    begin = Selection.everything(alone)
-    done = snooping.screen_bundle(
-        alone, replace(begin, images=begin.images & (alone.images.point != at)), BundleSettings()
-    )
-    assert done.selection.images[row]
-    assert done.selection.control[alone.control.point == at].all()
-
-
 @pytest.mark.slow
 def test_a_tenth_of_the_rays_takes_few_adjustments() -> None:
     """91 adjustments with one point of a neighbourhood at a time, and the same rays go."""
