@@ -12,8 +12,6 @@ from benchmarks import planted
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
-PYTHON = sys.executable  # loads what it runs
-
 
 @pytest.fixture(autouse=True)
 def _copies(request: pytest.FixtureRequest) -> None:

@@ -12,7 +12,7 @@ import pytest
 import photostrip
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
-from tests.foreign.colmap_models import OPENCV, SCALE, SHIFT, SPEC, TO_MODEL, name_of, simulated
+from tests.foreign.colmap_models import OPENCV, name_of, simulated
 from tests.foreign.converting import convert, refused, with_control
 from tests.loops import nonempty
 
@@ -57,17 +57,6 @@ def test_camera_positions_say_where_the_model_lies(tmp_path: Path) -> None:
         photo, *xyz = line.split(",")[:4]
         at = [found[name_of(photo)][name] for name in "xyz"]
         assert at == pytest.approx([float(each) for each in xyz], abs=0.3)
-
-
-def test_without_control_it_is_a_free_network_in_the_frame_of_the_model(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native")
-    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
-    found = photostrip.run(tmp_path / "block" / "project.yaml")
-    assert [each["code"] for each in found.document["notes"] if each["code"] == "free-network"]
-    truth = photostrip.simulate(SPEC).truth["photos"]
-    expected = TO_MODEL.apply(SCALE * np.array([[each[name] for name in "xyz"] for each in truth])) + SHIFT
-    at = {each["id"]: [each[name] for name in "xyz"] for each in found.document["photos"]}
-    assert np.abs([at[name_of(each["id"])] for each in truth] - expected).max() < 0.02  # of a flight of 3.7 units
 
 
 def test_text_and_binary_are_the_same_project(tmp_path: Path) -> None:
@@ -125,23 +114,6 @@ def test_what_was_understood_is_printed(tmp_path: Path, capsys: pytest.CaptureFi
     assert "5500 x 3667 px, f 3666.67 px, principal point +10.00, -4.83 px from the middle, y up" in captured.out
     assert "standard deviation 0.5 px; a pixel is taken as 1 µm" in captured.out
     assert captured.err.startswith("wrote observations.csv, orientations.csv, project.yaml to")
-
-
-def test_what_determines_nothing_is_left_out_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    model = simulated(tmp_path / "native")
-    _, quaternion, shift, camera, name, xy, points = model.images[0]
-    points[1] = points[0]  # twice on this photo
-    points[2] = -1  # a keypoint without a point
-    points[3] = 10**12  # on one photo only
-    model.images += [(1000, quaternion, shift, camera, 'empty, "quoted".jpg', xy[:0], [])]
-    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block") == 0
-    assert (
-        "1 point of a photo that stand on it twice: nothing says which is right; 1 point on one photo only; "
-        '1 photo without points: empty, "quoted".jpg'
-    ) in capsys.readouterr().out
-    rows = (tmp_path / "block" / "observations.csv").read_text(encoding="utf-8").splitlines()
-    assert sum(row.startswith(name + ",") for row in rows) == len(points) - 4
-    assert check_project(tmp_path / "block" / "project.yaml").faults == ()
 
 
 # ----------------------------------------------------------------------------------------------------- refusals

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import photostrip
 from photostrip.cli.main import main
-from tests.foreign.colmap_models import SPEC, simulated
+from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -277,29 +277,6 @@ def test_orthority_has_every_orientation_and_the_departure_of_its_map_is_told(
         assert CRS.from_wkt((tmp_path / "ori.prj").read_text(encoding="utf-8")) == CRS(UTM)
 
 
-def test_geojson_of_orthority_says_the_same_as_its_table(
-    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if block.document["frame"]["crs"] == "local":
-        assert "has none; write CSV (.csv)" in refused(capsys, str(block), str(tmp_path / "ori.geojson"))
-        return
-    for name in ("ori.csv", "ori.geojson"):
-        assert main(["convert", str(block), str(tmp_path / name), "-q"]) == 0
-    found = json.loads((tmp_path / "ori.geojson").read_text(encoding="utf-8"))
-    assert CRS.from_wkt(found["world_crs"]) == CRS(UTM)
-    to_map = Transformer.from_crs("EPSG:4326", UTM, always_xy=True)
-    for row, each in nonempty(list(zip(table(tmp_path / "ori.csv"), found["features"], strict=True))):
-        known = each["properties"]
-        assert (row["filename"], row["camera"]) == (known["filename"], known["camera"])
-        assert [float(row[name]) for name in "xyz"] == known["xyz"]
-        assert np.radians([float(row[name]) for name in ("omega", "phi", "kappa")]) == pytest.approx(known["opk"])
-        lon, lat, height = each["geometry"]["coordinates"]
-        assert (*to_map.transform(lon, lat), height) == pytest.approx(known["xyz"], abs=1e-3)
-    rows, _, meta = (pyogrio.raw.read(tmp_path / "ori.geojson")[place] for place in (3, 2, 0))
-    assert len(rows[0]) == len(block.document["photos"])
-    assert meta["crs"] == "EPSG:4979"
-
-
 # ----------------------------------------------------------------------------------------------------- COLMAP
 
 
@@ -399,30 +376,6 @@ def off_the_measured(found: Ran, model: Path) -> float:
         away = [ray.xy - measured[each.name, names[ray.point3D_id]] for ray in rays]
         largest = max(largest, float(np.linalg.norm(away, axis=1).max()))
     return largest
-
-
-def test_a_model_that_came_from_colmap_goes_back_with_its_names_and_numbers(tmp_path: Path) -> None:
-    given = simulated(tmp_path / "native")
-    given.cameras[7] = given.cameras[4]  # two cameras of the same kind
-    given.images = [each if number % 2 else (*each[:3], 7, *each[4:]) for number, each in enumerate(given.images)]
-    given.images = [(*each[:4], each[4].replace(" ", "_"), *each[5:]) for each in given.images]
-    given.write_text(tmp_path / "model")
-    block = tmp_path / "block"
-    assert main(["convert", str(tmp_path / "model"), "-o", str(block), "--sigma", "0.5", "-q"]) == 0
-    assert main(["run", str(block / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
-    assert main(["convert", str(tmp_path / "run"), f"{tmp_path / 'back'}/", "-q"]) == 0
-    after = {each.name: each for each in pycolmap.Reconstruction(tmp_path / "back").images.values()}
-    assert set(after) == {each[4] for each in given.images}
-    cameras: dict[int, set[int]] = {4: set(), 7: set()}
-    for _, _, _, camera, name, xy, points in nonempty(given.images):
-        cameras[camera].add(after[name].camera_id)
-        known = dict(zip(points, xy.tolist(), strict=True))
-        rays = {ray.point3D_id: ray.xy for ray in after[name].points2D if ray.has_point3D()}
-        assert len(rays) > 0.9 * len(known)
-        for point, place in rays.items():
-            assert place == pytest.approx(known[point], abs=0.2)  # a unit is 27 m, written to 0.1 mm
-    assert [len(each) for each in cameras.values()] == [1, 1]
-    assert cameras[4] != cameras[7]
 
 
 # ----------------------------------------------------------------------------------------------------- OpenSfM

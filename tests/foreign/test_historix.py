@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
-import re
-from random import Random
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +11,6 @@ import pytest
 from photostrip.cli.main import main
 from tests.foreign.converting import convert, refused
 from tests.foreign.historix_blocks import FILES, OPTIONS, copied, plane, simulated, with_ties
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
-from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -126,32 +120,3 @@ def test_a_distortion_has_no_unit_there(tmp_path: Path, capsys: pytest.CaptureFi
     assert "nothing says in which unit k1 is" in refused(capsys, source, tmp_path / "block", *OPTIONS)
     (source / FILES[0]).write_text(f"{head}\n{row}\n{row}\n", encoding="utf-8")
     assert "2 cameras, and nothing says which photo has which" in refused(capsys, source, tmp_path / "block", *OPTIONS)
-
-
-# ----------------------------------------------------------------------------------------------------- damage
-
-
-@pytest.mark.slow
-def test_a_damaged_project_is_refused_or_written_whole(tmp_path: Path) -> None:
-    random, written = Random("historix"), 0
-    folder = copied(tmp_path / "historix")
-    whole = {name: (folder / name).read_bytes() for name in FILES}
-    for number in nonempty(range(DAMAGED)):
-        for name, data in whole.items():
-            (folder / name).write_bytes(data)
-        name = random.choice(list(whole))
-        (folder / name).write_bytes(damaged(whole[name], random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = convert(folder, target, *OPTIONS)
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(rf"({'|'.join(FILES)})(:\d+)*: ", said.getvalue()), said.getvalue()
-        elif (written := written + 1) % 3 == 0:
-            with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-                main(["check", str(target / "project.yaml")])
-                faults = [line for line in said.getvalue().splitlines() if line.startswith("error: ")]
-                allowed = "expected at least 4, better 12", "photo-not-tied", "camera_positions"  # no tie points yet
-                assert [line for line in faults if not any(each in line for each in allowed)] == []
-    assert 0.02 * DAMAGED < written < 0.9 * DAMAGED

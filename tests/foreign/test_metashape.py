@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import re
-from random import Random
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,14 +12,12 @@ import yaml
 from pyproj import Transformer
 
 import photostrip
-from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
 from photostrip.project.checks.check import check_project
 from tests.foreign import colmap_models
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
 from tests.foreign.metashape_models import SCALE, UTM, cameras, document, label_of, markers, simulated
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -237,22 +232,3 @@ def test_what_is_wrong_is_refused(tmp_path: Path, kind: str, capsys: pytest.Capt
     said = refused(capsys, source, tmp_path / "block", "--control", str(source))
     assert words in said
     assert "cameras.xml" in said
-
-
-@pytest.mark.slow
-def test_a_damaged_file_is_refused_or_written_whole(tmp_path: Path) -> None:
-    random, whole, written = Random("metashape"), small().encode(), 0
-    source = tmp_path / "cameras.xml"
-    for number in nonempty(range(DAMAGED)):
-        source.write_bytes(damaged(whole, random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        arguments = ["--sigma", "0.5", "--control", str(source), "--control-sigma", "1"]
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(source), "-o", str(target), *arguments])
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(r"cameras\.xml(:\d+)*: ", said.getvalue()), said.getvalue()
-        else:
-            written += 1
-    assert 0.02 * DAMAGED < written < 0.9 * DAMAGED

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
-import re
-from random import Random
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from pyproj import Transformer
 
 import photostrip
-from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
-from tests.foreign.colmap_models import simulated
+from tests.foreign.colmap_models import simulated, small_model
 from tests.foreign.converting import convert, refused, with_control
 from tests.foreign.opensfm_models import BROWN, ground_control, reconstruction, tracks, write
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged, model
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -27,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def small() -> tuple[dict[str, Any], str]:
-    return reconstruction(model()), tracks(model())
+    return reconstruction(small_model()), tracks(small_model())
 
 
 # ----------------------------------------------------------------------------------------------------- results
@@ -202,28 +196,3 @@ def test_control_asks_for_its_precision_and_for_no_width(tmp_path: Path, capsys:
     assert "nothing says how precise the control is" in told
     given = ("--control", str(control), "--control-sigma", "0.1", "--mark-width", "100")
     assert "the marks are parts of the photo" in refused(capsys, source, tmp_path / "block", *given)
-
-
-# ----------------------------------------------------------------------------------------------------- damage
-
-
-@pytest.mark.slow
-def test_a_damaged_reconstruction_is_refused_or_written_whole(tmp_path: Path) -> None:
-    random, written = Random("opensfm"), 0
-    folder = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    whole = {name: (folder / name).read_bytes() for name in ("reconstruction.json", "tracks.csv")}
-    for number in nonempty(range(DAMAGED)):
-        for name, data in whole.items():
-            (folder / name).write_bytes(data)
-        name = random.choice(list(whole))
-        (folder / name).write_bytes(damaged(whole[name], random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(folder), "-o", str(target), "--sigma", "0.5"])
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(r"(reconstruction\.json|tracks\.csv)(:\d+)*: ", said.getvalue()), said.getvalue()
-        elif (written := written + 1) % 10 == 0:
-            assert check_project(target / "project.yaml").faults == (), (folder / name).read_bytes()
-    assert 0.05 * DAMAGED < written < 0.9 * DAMAGED

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Proj, Transformer
 
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import InputError
 from photostrip.geodesy.tying import tie_frames
 from tests.geodesy.frames import NEU, frame, krueger, spec
 
@@ -143,39 +143,6 @@ def test_convergence_has_the_sign_of_the_textbooks() -> None:
     xyz = np.vstack([cartesian(UTM33, np.array([lon, lat, 0.0])) for lon, lat in ((17, 50), (13, 50), (17, -50))])
     found = UTM33.convergence(xyz)
     assert found == pytest.approx(np.radians([2.0, -2.0, -2.0]) * math.sin(math.radians(50.0)), abs=1e-4)
-
-
-def test_a_polar_grid_works_at_its_pole() -> None:
-    for crs, normal in (("EPSG:3031", -1.0), ("EPSG:5041", 1.0), ("EPSG:32661", 1.0)):
-        grid = FRAMES[crs]
-        xyz = cartesian(grid, np.array([0.0, normal * 90.0, 100.0]))
-        axes = grid.axes_at(xyz)[0]
-        assert axes[2] == pytest.approx((0.0, 0.0, normal), abs=NANORADIAN)
-        assert np.linalg.det(axes) == pytest.approx(1.0)
-        enu = grid.ground_from_cartesian(xyz)
-        assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
-        with pytest.raises(GeometryError, match="row 0: at a pole there is no east and no north"):
-            grid.convergence(xyz)
-
-
-def test_at_a_pole_a_geographic_frame_has_no_axes() -> None:
-    grid = frame("EPSG:4979")
-    xyz = grid.cartesian_from_ground([[30.0, 50.0, 0.0], [30.0, 90.0, 5.0]])
-    assert grid.ground_from_cartesian(xyz)[1, 1:] == pytest.approx((90.0, 5.0))
-    with pytest.raises(GeometryError, match="row 1: at a pole there is no east and no north"):
-        grid.axes_at(xyz)
-
-
-@given(lon=st.floats(-180.0, 180.0), lat=st.floats(-89.9, 89.9))
-def test_axes_of_a_geographic_frame(lon: float, lat: float) -> None:
-    grid = frame("EPSG:4326")
-    axes = grid.axes_at(cartesian(grid, np.array([lon, lat, 10.0])))[0]
-    sin_l, cos_l, sin_b, cos_b = (
-        *(f(np.radians(lon)) for f in (np.sin, np.cos)),
-        *(f(np.radians(lat)) for f in (np.sin, np.cos)),
-    )
-    expected = [[-sin_l, cos_l, 0.0], [-sin_b * cos_l, -sin_b * sin_l, cos_b], [cos_b * cos_l, cos_b * sin_l, sin_b]]
-    assert axes == pytest.approx(np.array(expected), abs=1e-13)
 
 
 # ------------------------------------------------------------------------------- units, bodies, differences

@@ -38,8 +38,6 @@ from photostrip.simulation import (
     simulate,
 )
 from photostrip.strip.polynomial import correction
-from photostrip.strip.relative_orientation.orientation import RelativeSettings
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.attitudes import angle_between
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
@@ -136,29 +134,6 @@ def assert_exact(found: Recovery) -> None:
 # ------------------------------------------------------------------------------------------------ free of errors
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("photos", [3, 10, 50, 200])
-def test_a_strip_of_any_length_comes_back(photos: int) -> None:
-    assert_exact(recovered(exact(Spec(flight=Flight(photos=photos)))))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "flight",
-    [
-        Flight(attitude_sigma_deg=(5.0, 5.0, 5.0), end_lap_percent=75.0),
-        Flight(end_lap_percent=80.0),
-        Flight(photos=8, strips=3, side_lap_percent=35.0),
-        Flight(photos=7, strips=2, side_lap_percent=35.0, alternate=True),
-        Flight(scale=50_000.0),
-        Flight(scale=4000.0),
-    ],
-    ids=["tilted", "80 percent", "three strips", "there and back", "small scale", "large scale"],
-)
-def test_any_flight_comes_back(flight: Flight) -> None:
-    assert_exact(recovered(exact(Spec(flight=flight))))
-
-
 MOON = "+proj=longlat +a=1737400 +b=1737400 +no_defs"
 
 
@@ -238,19 +213,6 @@ def test_no_adjustment_spoils_what_is_exact(adjustment: str, degree: str) -> Non
     assert used is None or used.degree == int(degree)
 
 
-@pytest.mark.parametrize(
-    "asked",
-    [
-        Settings(formation=StripFormationSettings("distances")),
-        Settings(relative=RelativeSettings(screening="tau")),
-        Settings(relative=RelativeSettings(screening="none")),
-    ],
-    ids=["distances", "tau", "no screening"],
-)
-def test_no_way_of_working_spoils_what_is_exact(asked: Settings) -> None:
-    assert_exact(recovered(exact(Spec()), asked))
-
-
 def distorted(direction: str) -> Camera:
     return replace(FILM, distortion=Distortion("brown", direction, k=(4e-8, -2e-12, 0.0), p=(2e-7, -1e-7)))
 
@@ -316,12 +278,6 @@ def test_whatever_is_flown_comes_back(
         terrain=Terrain(relief=relief),
     )
     assert_exact(recovered(exact(spec)))
-
-
-def test_the_final_orientations_fit_the_adjusted_points() -> None:
-    strip = recovered(exact(Spec(flight=Flight(photos=30)))).result.strips[0]
-    assert np.abs(strip.of_photos.resection.residuals).max() < 1e-9  # mm
-    assert strip.scale_number == pytest.approx(10_000.0, rel=0.01)
 
 
 # ------------------------------------------------------------------------------------------- rotations and frames
@@ -407,6 +363,16 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     assert (found["similarity"] < 1.15 * np.array([3.4, 3.2, 7.0])).all()
     assert (found["similarity"] > found["2"]).all()
     assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["2"])
+
+
+@pytest.mark.slow
+def test_twenty_models_stay_within_their_limits() -> None:
+    """With four bands: 12 strips know their rms to 9 to 14 %; benchmarks/accuracy.py takes more."""
+    found = rms(strip_of(20, 4), 12, "similarity", "3", "auto")
+    assert (found["3"] < 1.1 * np.array([2.9, 2.9, 5.9])).all()
+    assert (found["3"] > 0.5 * np.array([2.9, 2.9, 5.9])).all()
+    assert (found["similarity"] > 1.5 * found["3"]).all()
+    assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["3"])
 
 
 # ----------------------------------------------------------------------------------- what must not influence

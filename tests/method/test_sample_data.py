@@ -270,6 +270,13 @@ def test_lunar_models_are_joined_by_as_many_points_with_the_same_spread() -> Non
     assert ratio_spread(strip) == pytest.approx([2.1e-3, 8.5e-4, 5.9e-4], rel=0.08)
 
 
+def test_the_scale_transfer_finds_the_lunar_outlier_too() -> None:
+    found = apollo(screening="none", free=False)
+    joints = found.strips[0].of_photos.formed.junctions
+    names = [found.refined.observations.point_ids[point] for point in joints.point[~joints.used]]
+    assert names == [OUTLIER]
+
+
 def test_a_similarity_on_all_lunar_points_leaves_what_others_found() -> None:
     errors = lunar_errors(apollo(screening="none"), check=False)
     assert len(errors) == 303

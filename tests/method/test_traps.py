@@ -18,7 +18,6 @@ from photostrip.points import PhotoPoints
 from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
 from photostrip.strip import absolute_orientation
 from photostrip.strip.polynomial import correction
-from tests.loops import nonempty
 from tests.results import write_project
 from tests.simulated import inputs_of
 
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
-CUBIC = ("1", "X", "Y", "XY", "X^2", "X^3")
 SIMILARITY = Settings(adjustment="similarity")
 LOCAL = FrameSpec("local", ("east", "north", "up"))
 PLANE_MAP = replace(
@@ -53,10 +51,6 @@ def errors(simulation: Simulation, result: Result) -> Floats:
 
 def rms(values: Floats) -> float:
     return float(np.sqrt((values**2).mean()))
-
-
-def codes(result: Result) -> set[str]:
-    return {note.code for note in result.notes}
 
 
 def true_places(simulation: Simulation, strip: StripResult) -> Floats:
@@ -101,62 +95,7 @@ def test_six_points_fit_a_cubic_perfectly_and_say_nothing_between(seed: int) -> 
     assert np.abs(bent).max() > 5.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_stations_count_not_points(seed: int) -> None:
-    done, inputs = six_points(seed)
-    result = triangulate(inputs, degree("3"))
-    found = result.strips[0].polynomial
-    assert found is not None
-    assert found.stations == (3, 3)
-    assert found.degree == 2
-    assert all("X^3" not in axis.terms for axis in nonempty(found.axes))
-    assert "degree-reduced" in codes(result)
-    assert "3 stations" in next(note.message for note in result.notes if note.code == "degree-reduced")
-    assert np.abs(errors(done, result)).max() < 1.5
-    assert np.abs(errors(done, triangulate(inputs, degree("auto")))).max() < 2.0
-
-
 # --------------------------------------------------------- the X axis of the polynomials along the meridian
-
-
-def east_west_strip() -> tuple[Simulation, StripResult, Result]:
-    """Twenty models from west to east with a systematic error: a lens whose distortion nobody knows of."""
-    spec = Spec(
-        flight=Flight(photos=21, end_lap_percent=62.0, heading_deg=90.0),
-        image=Image(sigma_um=0.0),
-        control=Control(bands=4, noise=(0.0, 0.0, 0.0), sigma=(0.02, 0.02, 0.02)),
-    )
-    done = simulate(spec)
-    inputs = inputs_of(done)
-    xy = inputs.observations.xy
-    radius = np.hypot(*xy.T)[:, None]
-    bad = replace(inputs, observations=replace(inputs.observations, xy=xy * (1 + 2e-8 * radius**2)))  # 20 um at 100 mm
-    result = triangulate(bad, replace(SIMILARITY, polynomial=correction.PolynomialSettings("3")))
-    return done, result.strips[0], result
-
-
-def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Floats, correction.Polynomial]:
-    """Fit a cubic in a frame with its X axis in some azimuth; points come back in the Cartesian frame."""
-    frame = strip.intermediate.with_azimuth(azimuth)
-    xyz = frame.intermediate_from_cartesian(strip.cartesian)
-    targets = absolute_orientation.Targets(strip.control, result.frames, frame)
-    weight = absolute_orientation.weights(strip.control, strip.precision)
-    breadth = float(np.quantile(np.abs(xyz[:, 1]), 0.95))
-    problem = correction.FitProblem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
-    found = correction.fit(problem, correction.PolynomialSettings("3"))
-    return frame.cartesian_from_intermediate(found(xyz)), found
-
-
-@pytest.mark.slow
-def test_an_x_axis_along_the_meridian_spoils_the_polynomial_of_an_east_west_strip() -> None:
-    done, strip, result = east_west_strip()
-    truth = done.truth.points.xyz[strip.formed.point]
-    along, found = corrected_in(strip.intermediate.azimuth, strip, result)
-    meridian, _ = corrected_in(0.0, strip, result)
-    assert found.axes[0].terms == CUBIC
-    assert rms(along - truth) < 0.1 * rms(strip.cartesian - truth)
-    assert rms(meridian - truth) > 30 * rms(along - truth)
 
 
 @pytest.mark.parametrize("heading", [0.0, 73.0, 90.0, 180.0, 271.0])
@@ -288,15 +227,6 @@ def test_points_seen_once_are_listed_and_change_nothing() -> None:
     np.testing.assert_array_equal(
         before.strips[0].of_photos.resection.rotations, after.strips[0].of_photos.resection.rotations
     )
-
-
-# -------------------------------------------------------------------------------- what polynomials are not made for
-
-
-@pytest.mark.parametrize(("photos", "warned"), [(26, False), (27, True)])
-def test_long_strips_are_warned_of(photos: int, warned: bool) -> None:
-    done = simulate(Spec(flight=Flight(photos=photos), control=Control(every=5)))
-    assert ("long-strip" in codes(triangulate(inputs_of(done), Settings("polynomial")))) == warned
 
 
 # ------------------------------------------------------------------------------------------ the base across the frame

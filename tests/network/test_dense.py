@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
 
 from photostrip.geometry.rotation import from_vector
 from photostrip.network.cofactors import (
     JointCofactors,
     cofactors_of,
-    coordinates_of,
-    joint_cofactors,
 )
 from photostrip.network.problem import (
     AttitudeObservations,
@@ -179,16 +176,6 @@ def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
         )
     ]
     assert sum(every) + parts.sum() == pytest.approx(solution.redundancy, abs=1e-5)
-
-
-@pytest.mark.parametrize("problem", [strip(), with_everything()])
-def test_sums_of_coordinates_have_the_cofactors_of_the_joint_ones(problem: BundleProblem) -> None:
-    solution = solve(problem)
-    wanted = np.unique(problem.images.point)[::3]
-    factors = np.random.default_rng(2).standard_normal((len(wanted), 3, 2))
-    flat, coordinates = factors.reshape(-1, 2), coordinates_of(solution, wanted)
-    expected = flat.T @ joint_cofactors(solution, coordinates) @ flat
-    assert joint_cofactors(solution, csr_array(flat.T) @ coordinates) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["block", "everything"])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from photostrip.network import hypotheses
-from photostrip.network.gross_errors import snooping
 from photostrip.network.hypotheses import (
     DECENTRED,
     DISTANCE,
@@ -19,8 +18,6 @@ from photostrip.network.hypotheses import (
     LENS,
     LIST,
     OFFSET,
-    ORDER,
-    ORDERS,
     POINT,
     SCALE,
     SHIFT,
@@ -28,8 +25,6 @@ from photostrip.network.hypotheses import (
     most_likely,
 )
 from photostrip.network.problem import PositionObservations
-from photostrip.network.selection import Selection, supported
-from photostrip.network.settings import BundleSettings
 from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.loops import nonempty
@@ -98,33 +93,6 @@ def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
         after = solve(hypotheses.taken_up(problem, each))
         assert found.freedom == solution.redundancy - after.redundancy
         assert found.squares == pytest.approx(solution.chi_square - after.chi_square, rel=2e-3, abs=1e-3)
-
-
-def test_what_the_end_does_not_support_is_given_up_whatever_it_is() -> None:
-    """Positions had kept offsets and drifts, and control lists had stayed outside, that nothing spoke for any more."""
-    problem = with_positions_and_lists()
-    every, begun = Selection.everything(problem), solve(problem)
-    orders = [hypotheses.Hypothesis(ORDER, of=each) for each in ORDERS]
-    orders.append(hypotheses.Hypothesis(ORDER, of=hypotheses.EXCHANGED, pair=(1, 2)))
-    for each in (*nonempty(asked(begun)), *orders):
-        if each.kind == LIST:
-            each = replace(each, shift=(1.0,) * 3, sigma=(0.1,) * 3)  # noqa: PLW2901
-        search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
-        done = search.adjust(every)
-        search._take_up(each)
-        if each.kind != ORDER:  # wrong positions leave no adjustment
-            done = search.adjust(supported(search.problem, every))
-        left = search.put_back(done)
-        assert left is not None, each
-        if each.kind in hypotheses.PLAINER:
-            assert [kept.kind for kept in search.common] == [hypotheses.PLAINER[each.kind]]
-            left = search.put_back(search.clean(supported(search.problem, left)))
-            assert left is not None, each
-        assert search.common == []
-        assert left.given == every.given
-        again = search.clean(supported(search.problem, left))
-        assert again.solution.chi_square == pytest.approx(begun.chi_square, rel=1e-9)
-        assert again.solution.redundancy == begun.redundancy
 
 
 def moved(problem: BundleProblem, number: int) -> float:

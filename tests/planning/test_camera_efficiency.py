@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.camera import Distortion
-from photostrip.errors import InputError
 from photostrip.planning.camera_efficiency import (
     PRINTED_BASE,
     PRINTED_TABLE,
@@ -16,7 +14,6 @@ from photostrip.planning.camera_efficiency import (
     FlownSurvey,
     HighGround,
     compare,
-    sigma_from_distortion,
     sigma_from_mean_distortion,
     source_cameras,
     suitability,
@@ -82,33 +79,6 @@ def test_a_parallax_from_measuring_and_mean_distortion_scatters_so() -> None:
     assert sigma_from_mean_distortion(measuring, 0.0) == pytest.approx(np.sqrt(2) * measuring)
 
 
-def test_a_parallax_with_a_known_distortion_is_its_scatter_over_the_model() -> None:
-    k1, base, length, width = 4e-9, 92.0, 230.0, 161.0
-    rng = np.random.default_rng(8)
-    x, y = rng.uniform(base - length / 2, length / 2, 400_000), rng.uniform(-width / 2, width / 2, 400_000)
-    parallax = k1 * (x * (x**2 + y**2) - (x - base) * ((x - base) ** 2 + y**2))
-    brown = Distortion("brown", "image_to_ideal", k=(k1, 0.0, 0.0))
-    found = sigma_from_distortion(0.0, brown, base, length, width)
-    assert found == pytest.approx(parallax.std(), rel=0.06)  # a grid reaches the edges, drawn points hardly do
-    measured = sigma_from_distortion(0.003, brown, base, length, width)
-    assert measured == pytest.approx(np.hypot(found, 0.003 * np.sqrt(2)))
-    short = Distortion("radial-table", "image_to_ideal", radius=(0.0, 60.0), distortion=(0.0, 0.002))
-    with pytest.raises(InputError, match="beyond the distortion table"):
-        sigma_from_distortion(0.0, short, base, length, width)
-
-
-@pytest.mark.parametrize(
-    "survey", [FlownSurvey(scale=8000), FlownSurvey(flying_height=1224), FlownSurvey(height_sigma=0.0931304)]
-)
-def test_what_a_height_and_an_area_cost(survey: FlownSurvey) -> None:
-    flown = survey.flown(FILM)
-    # m_h = H m_p / b: a height at the distance H from a base of b m, of which a parallax is known to m_p m
-    assert flown.scale == pytest.approx(8000, rel=1e-5)
-    assert flown.flying_height == pytest.approx(1224, rel=1e-5)
-    assert flown.height_sigma == pytest.approx(1224 * 0.007 / 92, rel=1e-5)
-    assert flown.area == pytest.approx(0.736 * 1.288, rel=1e-5)
-
-
 def photos_of(place: float, height: float, flying_height: float, camera: ComparedCamera) -> int:
     """Count the photos of a long strip that show a point of its axis, by projecting it."""
     assert camera.length is not None
@@ -129,13 +99,3 @@ def test_the_largest_relief_is_where_no_point_is_left_on_three_photos() -> None:
     assert found.lap == pytest.approx(overlap)
     assert found.suits
     assert not suitability(FILM, FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))).suits
-
-
-def test_the_steepest_slope_is_that_which_the_outermost_ray_grazes() -> None:
-    steepest = suitability(FILM, FlownSurvey(scale=8000)).slope
-    ray = np.array([92.0, 80.5, -153.0])  # from the left photo to the corner of the model beside the right nadir
-    away = np.append(ray[:2] / np.hypot(*ray[:2]), 0.0)
-    for change, seen in ((-1e-3, True), (1e-3, False)):
-        slope = steepest + change
-        normal = np.array([0.0, 0.0, np.cos(slope)]) + away * np.sin(slope)  # a slope that falls away from the photo
-        assert (ray @ normal < 0) is np.bool_(seen)

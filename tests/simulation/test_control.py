@@ -88,18 +88,6 @@ def test_too_many_points_are_refused(control: Control, message: str) -> None:
         simulate(Spec(control=control))
 
 
-def test_shares_of_full_plan_and_height_points() -> None:
-    use = {"xyz": 0.5, "xy": 0.3, "z": 0.2}
-    done = simulate(Spec(flight=Flight(photos=20), control=Control(bands=7, use=use)))
-    kinds = [
-        "".join(axis for axis, used in zip("xyz", row, strict=True) if used)
-        for row in done.control.use[~done.control.check]
-    ]
-    assert [kinds.count(kind) for kind in ("xyz", "xy", "z")] == [11, 6, 4]  # of 21: 10.5, 6.3, 4.2
-    assert done.control.use[done.control.check].all()
-    assert np.array_equal(np.isnan(done.control.enu), ~done.control.use)
-
-
 def test_without_noise_the_given_coordinates_are_true() -> None:
     done = simulate(Spec(control=Control(noise=NONE)))
     assert done.control.enu == pytest.approx(true_ground(done, done.control.ids), abs=1e-6)

@@ -70,14 +70,6 @@ def test_gruber_points_stand_where_they_should() -> None:
     assert Counter(Counter(done.observations.point.tolist()).values()) == {3: 24, 2: 6}
 
 
-def test_neighbouring_strips_share_points() -> None:
-    done = simulate(Spec(flight=Flight(strips=3)))
-    on = photos_of(done)
-    strips = [set().union(*on[10 * j : 10 * j + 10]) for j in range(3)]
-    assert len(strips[0] & strips[1]) >= 10
-    assert len(strips[1] & strips[2]) >= 10
-
-
 def test_overlaps_are_those_asked_for() -> None:
     flight = Flight(
         strips=2, end_lap_percent=62.0, side_lap_percent=25.0, position_sigma=(0.0, 0.0, 0.0), flying_height=1530.0

@@ -13,12 +13,9 @@ from photostrip.terrestrial.accuracy import (
     as_printed,
     grid,
     required,
-    rounds_for,
-    supported,
     worked,
 )
 from photostrip.terrestrial.frame import directions_from_photo, ground_from_photo
-from photostrip.units import ARCSECONDS
 from tests.loops import nonempty
 from tests.vectors import cases
 
@@ -76,19 +73,6 @@ def test_required_accuracy_is_that_of_simulated_measurements() -> None:
 
 
 # ---------------------------------------------------------------------------------------------------- theodolite
-
-
-def test_two_seconds_and_four_rounds() -> None:
-    mean = 2.0 / np.sqrt(4)  # of four rounds
-    image = supported([80.0, 60.0], 100.0, mean / ARCSECONDS, mean / ARCSECONDS, LEVEL)
-    assert image[0] == pytest.approx(np.sqrt(2 * (100**2 + 80**2)) / 206264.806, rel=1e-6)  # 0.88 um
-    assert image[1] == pytest.approx(np.sqrt(100**2 + 80**2 + 60**2) / 206264.806, rel=1e-6)  # 0.69 um
-
-
-@pytest.mark.parametrize(("sigma", "wanted", "rounds"), [(2, 1, 4), (2, 0.99, 5), (2, 2, 1), (2, 5, 1), (3, 1, 9)])
-def test_rounds(sigma: float, wanted: float, rounds: int) -> None:
-    assert rounds_for(sigma, wanted) == rounds
-    assert sigma / np.sqrt(rounds) <= wanted
 
 
 @pytest.mark.parametrize(

@@ -95,18 +95,6 @@ def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
     assert np.mean([each.weighted_sum for each in still if each is not None]) == pytest.approx(11.0, abs=0.6)
 
 
-@pytest.mark.parametrize("point", range(len(PLACES)))
-def test_the_fit_without_a_point_is_the_fit_to_the_others(point: int) -> None:
-    given_ = pair((40 * ARCSECOND, 0, 0), 3)
-    whole, others = fit(given_, ALL), fit(given_, np.arange(len(PLACES)) != point)
-    assert whole is not None
-    assert others is not None
-    (values,), (normal,), (known,) = whole.predict(np.array([point]))
-    assert known
-    np.testing.assert_allclose(values, others.values, atol=1e-3 * others.sigma.min())
-    np.testing.assert_allclose(normal, others.normal, rtol=1e-3)
-
-
 # ------------------------------------------------------------------------------------------------- moved points
 
 

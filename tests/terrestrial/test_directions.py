@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.terrestrial.frame import (
-    angles_of,
     direction_gradient,
     directions_from_photo,
     directions_of,
@@ -45,24 +44,6 @@ def test_the_rotation_is_roll_then_elevation_then_azimuth(alpha: float, omega: f
     rotation = ground_from_photo(alpha, omega, kappa)
     np.testing.assert_allclose(rotation, np.column_stack([columns[:, 0], columns[:, 2], -columns[:, 1]]), atol=1e-14)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize(
-    ("angles", "axis", "expected"),
-    [
-        ((np.pi / 2, 0, 0), 2, (-1, 0, 0)),  # looks east: what lies behind is west
-        ((0, 0.1, 0), 2, (0, -np.cos(0.1), -np.sin(0.1))),  # looks up
-        ((0, 0, 0.1), 0, (np.cos(0.1), 0, np.sin(0.1))),  # the right edge rises
-    ],
-)
-def test_signs(angles: tuple[float, float, float], axis: int, expected: tuple[float, float, float]) -> None:
-    np.testing.assert_allclose(ground_from_photo(*angles)[:, axis], expected, atol=1e-15)
-
-
-@given(azimuths, tilts, azimuths)
-def test_angles_come_back(alpha: float, omega: float, kappa: float) -> None:
-    rotation = ground_from_photo(alpha, omega, kappa)
-    np.testing.assert_allclose(ground_from_photo(*angles_of(rotation)), rotation, atol=1e-14)
 
 
 @given(st.tuples(*[st.floats(-5, 5)] * 3).filter(lambda v: np.hypot(v[0], v[1]) > 0.1))

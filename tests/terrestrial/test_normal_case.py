@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from photostrip.errors import GeometryError
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.frame import ground_from_photo, small_turn
-from photostrip.terrestrial.normal_case import StereoPair, intersect, meeting_z, normal_pair, to_normal
+from photostrip.terrestrial.normal_case import StereoPair, intersect, meeting_z, to_normal
 from tests.terrestrial.simulated import CENTERS, FOCAL, SIGMA, attitude, photo, world
 
 if TYPE_CHECKING:
@@ -58,16 +58,6 @@ def test_convergent_photos_give_back_the_points(
         np.testing.assert_allclose(normal.parallax, 0.0, atol=1e-10)
     else:
         assert np.isnan(normal.parallax).all()
-
-
-def test_the_normal_case_leaves_coordinates_alone() -> None:
-    pair = normal_pair(190.0, 50.0)
-    measured = np.array([[30.0, -12.0, -50.0, -12.0], [5.0, 7.0, -20.0, 7.2]])
-    normal = to_normal(measured, np.ones_like(measured), pair, rotations(pair, 2))
-    np.testing.assert_allclose(normal.coordinates[0], measured[0], atol=1e-12)
-    np.testing.assert_allclose(normal.coordinates[1], [5.0, 7.1, -20.0, 7.1], atol=1e-12)  # both rays give way alike
-    np.testing.assert_allclose(normal.parallax, [0.0, -0.2], atol=1e-12)
-    np.testing.assert_allclose(pair.ground_from_normal(), np.eye(3), atol=1e-15)
 
 
 def test_the_intersection_is_the_least_squares_one() -> None:

@@ -86,13 +86,14 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
     PROJECT describes stations, cameras, epochs and measurements. A table alone is enough where the cameras stand in
     the normal case: axes parallel and at right angles to the base.
     """
+    from photostrip.errors import Fault, InputError
     from photostrip.formats.output.terrestrial_displacements import displacement_document, displacements_csv
     from photostrip.report.commands.terrestrial_displacements import displacement_report
-    from photostrip.report.pictures.terrestrial import check_plot
     from photostrip.terrestrial.monitoring import monitor
 
-    if plot is not None:
-        check_plot(str(plot))
+    if plot is not None and plot.suffix.lower() != ".svg":
+        message, expected = "pictures are written as SVG", "a name that ends in .svg"
+        raise InputError(Fault(message, "plot-format", str(plot), key="--plot", expected=expected))
     require_target(depfile, output)
     if str(source).casefold().endswith(TABLE_ENDS):
         survey = _from_table(source, base, camera, table, assignments)
@@ -204,10 +205,10 @@ def _write(document: dict[str, Any], output: Path | None, plot: Path | None) -> 
     from photostrip.formats.output.result_json import to_json
     from photostrip.formats.output.terrestrial_displacements import cameras_csv, displacements_csv
     from photostrip.formats.text.writing import write_files, write_text
-    from photostrip.report.pictures.terrestrial import displacement_plot
+    from photostrip.report.pictures.displacements import displacement_picture
 
     if output is not None:
         files = {"displacements.csv": displacements_csv(document), "cameras.csv": cameras_csv(document)}
         write_files(output, files | {"displacements.json": to_json(document)})
     if plot is not None:
-        write_text(plot, displacement_plot(document))
+        write_text(plot, displacement_picture(document).file())

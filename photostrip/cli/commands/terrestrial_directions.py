@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -38,7 +37,6 @@ Distance = Annotated[
 AngleUnit = Annotated[Literal["deg", "gon"], typer.Option("--angles", help="Unit of angles and directions.")]
 Unit = Annotated[Literal["mm", "um"], typer.Option("--unit", help="Unit of image coordinates.")]
 Format = Annotated[Form, typer.Option("--format", help="How the answer is printed.")]
-Plot = Annotated[Path | None, typer.Option("--plot", metavar="FILE.svg", help="Draw a picture, too.")]
 Step = Annotated[float, typer.Option("--step", metavar="MM", help="Distance of the points of the table.")]
 ImageTable = Annotated[str | None, typer.Argument(metavar="TABLE", help="Table `point,x,z` (CSV).", show_default=False)]
 DirectionTable = Annotated[
@@ -192,13 +190,11 @@ def accuracy(
         bool, typer.Option("--as-printed", help="Use the formulas as the source prints them; for a level camera.")
     ] = False,
     form: Format = "text",
-    plot: Plot = None,
 ) -> None:
     """Tell how accurately correction directions must be measured, all over the photo."""
     from photostrip.errors import Fault, InputError
     from photostrip.formats.output.terrestrial_directions import required_accuracy
     from photostrip.project.terrestrial.options import image_sigma
-    from photostrip.report.pictures.terrestrial import accuracy_plot
 
     attitude = looking.attitude()
     if as_printed and not looking.level:
@@ -209,7 +205,7 @@ def accuracy(
     def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
         return required_accuracy(chosen, attitude, sigma, grid, as_printed=as_printed)
 
-    _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=accuracy_plot, form=form)
+    _over_the_photo(camera, document, step, level=looking.level, form=form)
 
 
 @_command("theodolite", '--camera "UMK 10/1318" --theodolite "Theo 010" --rounds 4')
@@ -224,12 +220,10 @@ def theodolite(
     looking: Looking,
     step: Step = 20.0,
     form: Format = "text",
-    plot: Plot = None,
 ) -> None:
     """Tell which image accuracy a theodolite can vouch for, all over the photo."""
     from photostrip.formats.output.terrestrial_directions import theodolite_accuracy
     from photostrip.project.terrestrial.options import image_sigma
-    from photostrip.report.pictures.terrestrial import theodolite_plot
 
     attitude = looking.attitude()
     measured = measuring.sigmas()
@@ -238,7 +232,7 @@ def theodolite(
     def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
         return theodolite_accuracy(chosen, attitude, measured, wanted, grid)
 
-    _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=theodolite_plot, form=form)
+    _over_the_photo(camera, document, step, level=looking.level, form=form)
 
 
 def _over_the_photo(
@@ -247,34 +241,21 @@ def _over_the_photo(
     step: float,
     *,
     level: bool,
-    plot: Path | None,
-    draw: Callable[[dict[str, Any], dict[str, Any]], str],
     form: Form,
 ) -> None:
-    """Compute a table over the photo and print it; draw it on a finer one."""
+    """Compute a table over the photo and print it."""
     from photostrip.errors import Fault, InputError
     from photostrip.project.terrestrial.options import required_format
     from photostrip.project.terrestrial.ranges import STEP, within
-    from photostrip.report.pictures.terrestrial import FINE, check_plot
     from photostrip.terrestrial.accuracy import grid
 
-    if plot is not None:
-        check_plot(str(plot))
     chosen = camera.chosen()
     width, height = required_format(chosen)
     step = within("--step", step, STEP)
     if width * height / step**2 > MOST_POINTS:
         message = f"a step of {step:g} mm gives more than {MOST_POINTS} points"
         raise InputError(Fault(message, "range", key="--step", expected="a larger step"))
-    found = document(chosen, grid((width, height), step, level=level))
-    if plot is not None:
-        import numpy as np
-
-        from photostrip.formats.text.writing import write_text
-
-        across, upwards = np.linspace(-width / 2, width / 2, FINE), np.linspace(-height / 2, height / 2, FINE)
-        write_text(plot, draw(found, document(chosen, (across, upwards))))
-    _print(found, form)
+    _print(document(chosen, grid((width, height), step, level=level)), form)
 
 
 @_command("orient", 'sightings.csv --camera "Photheo 19/1318"')

@@ -185,23 +185,3 @@ def test_of_three_rays_the_wrong_one_is_found_across_the_base_and_not_along(
     assert along.cause in {WRONG_RAY, SEVERAL_RAYS}
     assert along.out[place]
     assert along.out.all() == (along.cause == SEVERAL_RAYS)
-
-
-def with_control(point: PointRays, axes: slice) -> PointRays:
-    """Give the point some of its three coordinates."""
-    known = np.eye(3)[axes] * 1e5
-    return replace(
-        point,
-        misfit=np.append(point.misfit, np.zeros(len(known))),
-        by_point=np.concatenate([point.by_point, known]),
-        of_photos=np.pad(point.of_photos, (0, len(known))),
-        inside=np.append(point.inside, np.zeros(len(known), bool)),
-    )
-
-
-def test_control_says_which_of_two_rays_is_wrong() -> None:
-    point = spoiled(a_point(5, 2), {(0, 0): 30.0})
-    assert not decide(point, limit()).out.any()  # an error along the base shows nowhere
-    found = decide(with_control(point, slice(0, 3)), limit())
-    assert found.out.tolist() == [True, False]
-    assert found.size[0, 0] == pytest.approx(30.0, rel=0.1)

@@ -10,9 +10,8 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.pipeline.inputs import Strip
-from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
-from photostrip.simulation import Control, Flight, Ground, Image, Spec, Terrain
+from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 from tests.simulated import inputs_of
 
@@ -195,21 +194,6 @@ def test_what_is_not_determined_is_named(words: str) -> None:
         adjusted(simulation, given(simulation))
 
 
-def test_a_strip_apart_is_named() -> None:
-    """Two strips that share no point; only the first has control."""
-    simulation = simulate(exact(flight=Flight(photos=6, strips=2)))
-    seen = simulation.observations
-    first = np.array([name in simulation.strips[0][1] for name in seen.photo_ids])[seen.photo]
-    of_first = np.isin(seen.point, seen.point[first])
-    rows = first | ~of_first
-    cut = PhotoPoints(
-        seen.photo_ids, seen.point_ids, seen.photo[rows], seen.point[rows], seen.xy[rows], seen.sigma[rows]
-    )
-    names = [seen.point_ids[n] for n in np.unique(seen.point[first])]
-    with pytest.raises(GeometryError, match="strip B: neither control"):
-        adjusted(simulation, replace(with_control(simulation, names), observations=cut))
-
-
 @pytest.mark.slow
 def test_sigma0_and_precision_are_those_of_the_noise() -> None:
     """Errors in units of the stated precision, over blocks of 200 points; limits on both sides."""
@@ -227,12 +211,3 @@ def test_sigma0_and_precision_are_those_of_the_noise() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)  # errors of neighbouring points go together
     assert np.mean(sigma0) == pytest.approx(1.0, abs=0.03)
     assert min(squares) > 150
-
-
-@pytest.mark.slow
-def test_stated_standard_deviations_that_are_wrong_are_told() -> None:
-    simulation = simulate(Spec(flight=Flight(photos=6, strips=2), image=Image(sigma_um=5.0)))
-    inputs = inputs_of(simulation)
-    observations = replace(inputs.observations, sigma=inputs.observations.sigma / 2)
-    result = adjusted(simulation, replace(inputs, observations=observations))
-    assert any(note.code == "unit-weight" and "too small" in note.message for note in result.notes)

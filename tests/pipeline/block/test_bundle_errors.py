@@ -53,26 +53,6 @@ def test_gross_errors_are_found_and_named() -> None:
 
 
 @pytest.mark.slow
-def test_the_size_of_an_error_is_estimated() -> None:
-    simulation = simulate(BLOCK)
-    inputs = inputs_of(simulation)
-    seen = inputs.observations
-    row = 100
-    xy = seen.xy.copy()
-    xy[row, 1] += 0.080
-    result = adjusted(simulation, replace(inputs, observations=replace(seen, xy=xy)))
-    photo, point = seen.photo_ids[seen.photo[row]], seen.point_ids[seen.point[row]]
-    told = [
-        r
-        for r in document_of(result)["rejected"]
-        if (r["photo"], r["point"]) == (photo, point) and r["stage"] == "bundle"
-    ]
-    assert result.bundle is not None
-    assert abs(told[0]["size"]) == pytest.approx(80.0, abs=35.0)
-    assert told[0]["size_unit"] == "um"
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["snooping", "robust"])
 def test_many_errors_at_once(method: str) -> None:
     spec = replace(BLOCK, gross_errors=(GrossError("image", count=30, size_um=400.0, axis="y"),))

@@ -11,12 +11,9 @@ import pytest
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.pipeline.inputs import AUTO
-from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Gnss, Image, Points, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, orientations, positions, simulate, with_control
-from tests.simulated import settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -149,15 +146,6 @@ def test_neither_the_list_nor_the_table_decides() -> None:
     assert apart(one, other) < ROUNDING
 
 
-@pytest.mark.parametrize("degrees", [(0, 90, 180, 270), (17, 203, 81, 340, 122)])
-def test_photos_are_turned_in_any_way(degrees: tuple[float, ...]) -> None:
-    simulation = block()
-    straight = adjusted(simulation, five_points(simulation))
-    result = adjusted(simulation, turned(in_no_order(five_points(simulation)), degrees))
-    assert "4 strips found" in told(result)
-    assert rms(simulation, result) < 1.05 * rms(simulation, straight)
-
-
 def test_photos_start_from_their_given_orientations() -> None:
     """To three degrees and three metres; no strip is looked for then."""
     simulation = block()
@@ -220,21 +208,3 @@ def test_a_photo_that_hangs_on_nothing_is_refused_by_name() -> None:
     inputs = with_points_of_their_own(five_points(simulation), ["3003"])
     with pytest.raises(GeometryError, match=r"photo 3003, which is in no strip, .*give its orientation roughly"):
         adjusted(simulation, in_no_order(inputs))
-
-
-def test_what_is_too_much_for_a_start_says_what_to_give() -> None:
-    simulation = block()
-    inputs = with_points_of_their_own(five_points(simulation), ["3001", "3002", "3003", "3004"])
-    with pytest.raises(GeometryError, match=r"strip 3001-3004: .* give their orientations roughly .* COLMAP"):
-        adjusted(simulation, in_no_order(inputs))
-
-
-def test_single_photos_are_no_strips_for_polynomials() -> None:
-    """`auto` that finds no bundle says why, and does not fall over single photos."""
-    simulation = block()
-    given = rough(simulation, 0.0, 0.0)
-    far = replace(given, angles=given.angles + 1.5)
-    inputs = in_no_order(five_points(simulation))
-    listed = replace(inputs, strips=tuple(replace(strip, listed=True) for strip in inputs.strips), orientations=far)
-    with pytest.raises(GeometryError, match=r"determine|converge"):
-        triangulate(listed, replace(settings_of(simulation), adjustment=AUTO))

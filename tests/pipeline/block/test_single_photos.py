@@ -45,12 +45,6 @@ def test_single_photos_on_full_control_come_back_to_the_truth(crs: str) -> None:
     assert [row["strip"] for row in document["precision"]["basis"]] == [photo["id"] for photo in document["photos"]]
 
 
-def test_single_photos_with_three_known_points_each_are_refused_with_a_way_out() -> None:
-    simulation = simulate(exact(flight=Flight(photos=6), control=replace(MANY, bands=2)))
-    with pytest.raises(GeometryError, match=r"3 known points .*; list photos that overlap as one strip"):
-        adjusted(simulation, singles(simulation))
-
-
 @pytest.mark.slow
 def test_every_output_knows_single_photos() -> None:
     simulation = simulate(replace(Spec(), flight=Flight(photos=6), control=replace(MANY, noise=(0.05, 0.05, 0.08))))

@@ -13,8 +13,6 @@ from photostrip.network.settings import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.run import triangulate
-from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
 from photostrip.strip.error_propagation import strip_at_control
 from photostrip.strip.independent_models.settings import LinkSettings
@@ -66,38 +64,6 @@ def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str,
         assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
     assert len(result.ties.number) > 3
     assert np.abs(result.ties.difference).max() < EXACT
-
-
-def test_the_hand_of_the_axes_is_told() -> None:
-    given = truth(5, 3, 2, relief=3.0)
-    measured = given.measured()
-    mirrored = replace(measured, xyz=measured.xyz * [1.0, -1.0, 1.0])
-    with pytest.raises(InputError) as told:
-        triangulate(inputs(given, mirrored), PLAIN)
-    assert [fault.code for fault in told.value.faults] == ["left-handed-models"]
-    swapped = inputs(given, measured)
-    control = replace(swapped.control, enu=swapped.control.enu[:, [1, 0, 2]])
-    with pytest.raises(InputError) as told:
-        triangulate(replace(swapped, control=control), PLAIN)
-    assert [fault.code for fault in told.value.faults] == ["left-handed-models"]
-
-
-def test_centers_may_be_missing() -> None:
-    given = truth(5, 4, 2)
-    measured = given.measured()
-    points = len(given.points)
-    for gone in (given.node == points + 2, given.node >= points):
-        rows = np.flatnonzero(~gone)
-        some = replace(
-            measured, model=given.model[rows], node=given.node[rows], xyz=measured.xyz[rows], sigma=measured.sigma[rows]
-        )
-        result = triangulate(inputs(given, some), Settings())
-        assert np.abs(result.points.cartesian - given.points).max() < EXACT
-        document = document_of(result)
-        empty = [photo["id"] for photo in document["photos"] if photo["x"] is None]
-        assert empty == (["103"] if gone.sum() == 2 else list(measured.photo_ids))
-        assert {note["code"] for note in document["notes"]} >= {"link-without-center"}
-        assert len(sections_of(document)) > 10
 
 
 @pytest.mark.parametrize("coordinates", [100, 27])

@@ -13,7 +13,7 @@ import pytest
 import photostrip
 from benchmarks import planted
 from photostrip.cli.main import main
-from photostrip.errors import InputError, PhotostripError
+from photostrip.errors import PhotostripError
 from photostrip.formats.output.simulation import project_files
 from photostrip.geometry.rotation import angles
 from photostrip.notes import LOST_SAY
@@ -21,7 +21,6 @@ from photostrip.pipeline.inputs import GivenOrientations, Settings
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
 from photostrip.plausibility import KINDS
-from photostrip.plausibility.photos import flight_order
 from photostrip.simulation import (
     DIGITAL,
     Control,
@@ -201,14 +200,6 @@ def in_bulgaria(folder: Path, second: str | None = None) -> Path:
     return write_project(folder, spec)
 
 
-def test_zones_are_used_beyond_the_countries_for_which_they_were_registered(tmp_path: Path) -> None:
-    project = in_bulgaria(tmp_path, "EPSG:28405")
-    check, result = photostrip.check(project), photostrip.run(project)
-    assert check.ok
-    assert check.findings == ()
-    assert (result.status, result.document["findings"]) == ("good", [])
-
-
 def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
     project = in_bulgaria(tmp_path)
     text = project.read_text(encoding="utf-8").replace("EPSG:28404", "EPSG:28405")
@@ -221,20 +212,6 @@ def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
     assert result.document["verdict"]["look_at"][0].startswith("P402 control[0] lies about 17.9 E")
 
 
-@pytest.mark.parametrize(("of_images", "of_distance"), [(10.0, 1.0), (1.0, 0.1)])
-def test_points_that_no_lens_sees_without_a_format(of_images: float, of_distance: float) -> None:
-    """They reached to six times the principal distance, and the run was called good."""
-    inputs = inputs_of(simulation("utm"))
-    (strip,) = inputs.strips
-    distance = strip.camera.principal_distance * of_distance
-    camera = replace(strip.camera, principal_distance=distance, format=None)
-    observations = replace(inputs.observations, xy=inputs.observations.xy * of_images)
-    wrong = replace(inputs, strips=(replace(strip, camera=camera),), observations=observations)
-    (finding,) = gate.of_inputs(wrong, Settings())
-    assert finding.code == "P101"
-    assert f"or the principal distance is not {distance:g} mm" in finding.message
-
-
 @pytest.mark.parametrize("factor", [0.1, 0.01, 0.001])
 @pytest.mark.parametrize("frame", ["utm", "south"])
 def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: float) -> None:
@@ -242,12 +219,6 @@ def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: fl
     (finding,) = told(with_control(inputs_of(simulation(frame)), lambda enu: enu * factor))
     assert finding.code == "P402"
     assert finding.evidence["factor"] == pytest.approx(1 / factor)
-
-
-def test_heights_that_count_downwards() -> None:
-    (finding,) = told(with_control(inputs_of(simulation("local")), lambda enu: enu * [1, 1, -1]))
-    assert finding.code == "P401"
-    assert "downwards" in finding.message
 
 
 @pytest.mark.slow
@@ -358,17 +329,6 @@ def test_a_height_beyond_the_earth_is_told_without_digits(frame: str, written: f
     assert "would_fit" not in finding.evidence
 
 
-def test_a_check_point_outside_a_projection_is_refused_by_name() -> None:
-    inputs = inputs_of(simulation("utm"))
-    row = int(np.flatnonzero(inputs.control.check)[1])
-    away = with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [1e8, 0.0, 0.0]))
-    with pytest.raises(InputError, match=f"point {inputs.control.ids[row]}: outside the domain"):
-        triangulate(away, Settings(adjustment="polynomial"))
-    assert [(each.code, each.points) for each in triangulate(away, Settings()).findings] == [
-        ("P406", (inputs.control.ids[row],))
-    ]
-
-
 @pytest.mark.slow
 def test_two_control_points_exchanged() -> None:
     inputs = inputs_of(simulation("utm"))
@@ -423,17 +383,6 @@ def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: 
     assert main(["check", str(project), "--format", "json"]) == 2
     checked = {each["code"] for each in json.loads(capsys.readouterr().out)["projects"][0]["findings"]}
     assert {"P101", "P201", "P401", "P406"} <= checked
-
-
-@pytest.mark.slow
-def test_findings_are_told_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    project, _ = four_faults(tmp_path, "utm")
-    assert main(["run", str(project), "--format", "github"]) in {2, 3}
-    lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("::error") and "title=photostrip P101::" in line for line in lines)
-    assert any(line.startswith("::warning") and "title=photostrip P406::" in line for line in lines)
-    assert main(["run", str(project)]) in {2, 3}
-    assert "P201" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -507,19 +456,6 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
 
 
 # ---------------------------------------------------------------------------------- a closer look where it is needed
-
-
-@pytest.mark.parametrize("seed", [26, 68, 112])
-def test_tilts_as_large_as_bases_are_no_wrong_order(seed: int) -> None:
-    lens = Flight(photos=6, end_lap_percent=78.0, attitude_sigma_deg=(3.0, 3.0, 2.0))
-    inputs = inputs_of(simulate(Spec(seed=seed, camera=DIGITAL, flight=lens)))
-    (screen,) = flight_order.find_wrong_order(inputs.observations, "A", inputs.strips[0].photos)[0]
-    assert screen.code == "P201"  # side by side, the photos look exchanged
-    assert gate.of_inputs(inputs, Settings()) == ()
-    photos = [*inputs.strips[0].photos]
-    photos[3], photos[1] = photos[1], photos[3]
-    wrong = replace(inputs, strips=(replace(inputs.strips[0], photos=tuple(photos)),))
-    assert codes(gate.of_inputs(wrong, Settings())) == ["P201"]
 
 
 def test_ids_are_examined_before_a_run() -> None:
@@ -650,17 +586,6 @@ def test_a_reduced_photo_is_named_with_its_scale() -> None:
     (finding,) = (each for each in triangulate(inputs, case.settings).findings if each.code == "P109")
     assert set(finding.photos) == ids
     assert finding.evidence["scale"] == pytest.approx(1.0 / 1.5, abs=0.01)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [8810017, 8810070])
-def test_slips_that_turn_a_strip_of_models_over_are_named(seed: int) -> None:
-    """In the last third of 15 models; in a local system, where another order of columns fits by chance."""
-    case = planted.of_models(seed)
-    inputs, ids = planted_in(case, "slip of a digit, models")
-    (finding,) = triangulate(inputs, case.settings).findings
-    assert (finding.code, frozenset(finding.points)) == ("P406", ids)
-    assert "typing error" in finding.message
 
 
 @pytest.mark.parametrize(("wrong", "least"), [(1, 3), (2, 4)])

@@ -11,7 +11,7 @@ import pytest
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
-from photostrip.simulation import Control, Flight, Gnss, Image, Models, Spec, Terrain, simulate
+from photostrip.simulation import Control, Flight, Gnss, Image, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations
 from tests.simulated import inputs_of, settings_of
 
@@ -43,20 +43,6 @@ def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, came
         image=Image(sigma_um=8.0),
     )
     made = simulate(spec)
-    assert told(inputs_of(made), settings_of(made)) == []
-
-
-@pytest.mark.slow
-def test_the_bend_of_a_long_strip_of_models_is_no_slip() -> None:
-    spec = Spec(seed=1, flight=Flight(photos=50), control=Control(every=8, per_band=3), models=Models())
-    inputs = inputs_of(simulate(spec))
-    assert told(inputs, Settings()) == []
-
-
-@pytest.mark.slow
-def test_a_strip_that_the_earth_bends_more_than_it_is_broad_is_sound() -> None:
-    """550 km: the bend of 6 km is no breadth, and the breadth of 2 km no height."""
-    made = simulate(Spec(seed=13, flight=Flight(photos=600), control=Control(every=15, per_band=3)))
     assert told(inputs_of(made), settings_of(made)) == []
 
 

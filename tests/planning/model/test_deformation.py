@@ -9,14 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.planning.model.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,
     assumed_constants,
-    determines_paraboloid,
     fit_paraboloid,
     paraboloid_rows,
     parallax_error,
@@ -178,26 +176,6 @@ def test_factors_of_the_orientation_are_the_scatter_of_exact_orientations() -> N
 
 
 FIVE = np.array([[0.0, 65.0], [70.0, 65.0], [0.0, -65.0], [70.0, -65.0], [35.0, 0.0]])
-
-
-@pytest.mark.parametrize(
-    ("xy", "enough"),
-    [
-        (SIX, False),  # x² = b x
-        (FIVE, True),
-        (FIVE[:4], False),
-        (np.vstack([SIX, [[0.2, 0.0]]]), False),  # hardly another distance
-        (np.vstack([SIX, [[30.0, 0.0]]]), True),
-        (np.array([[x, 2.0] for x in range(6)]), False),
-        (np.array([[3.0, y] for y in range(6)]), False),
-    ],
-)
-def test_which_points_determine_the_surface(xy: Floats, *, enough: bool) -> None:
-    assert determines_paraboloid(xy) is enough
-    assert determines_paraboloid(xy * 250 + 4000) is enough  # whatever the unit and the origin
-    if not enough:
-        with pytest.raises(GeometryError, match="do not determine twist and bending"):
-            fit_paraboloid(xy, np.zeros(len(xy)), 1.0)
 
 
 @pytest.mark.slow

@@ -137,14 +137,6 @@ def test_the_same_photo_twice() -> None:
     assert arranged.photos == photos
 
 
-def test_a_gap_is_named_by_the_photos_beside_it() -> None:
-    made = simulation()
-    photos = made.strips[0][1]
-    with_gap = [*photos[:2], *photos[5:]]
-    (finding,) = found(made.observations, with_gap)
-    assert (finding.code, finding.photos) == ("P202", (photos[1], photos[5]))
-
-
 @pytest.mark.parametrize(
     ("factor", "word"), [(1e3, "micrometres read as millimetres"), (1e-3, "millimetres read as micrometres"),
                          (10.0, "tenths of a micrometre"), (0.1, "centimetres"), (1 / 25.4, "inches")]
@@ -172,14 +164,6 @@ def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: st
 @given(st.lists(st.floats(0.6, 1.6), min_size=1, max_size=8))
 def test_scans_and_old_paper_are_no_other_unit(scales: list[float]) -> None:
     assert units.find_wrong_mark_units(np.array(scales), [f"{number}" for number in range(len(scales))]) == []
-
-
-def test_pixels_read_as_millimetres() -> None:
-    made = simulation()
-    camera = replace(made.camera, pixel_size=0.006)
-    wrong = replace(made.observations, xy=(made.observations.xy + np.array([115.0, -115.0])) / 0.006)
-    (finding,), _ = units.find_wrong_units(wrong, dict.fromkeys(made.strips[0][1], camera))
-    assert "pixels read as millimetres" in finding.message
 
 
 @pytest.mark.parametrize("factor", [10.0, 0.1, 1000.0, 1e-3])

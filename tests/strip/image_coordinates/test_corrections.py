@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from photostrip.camera import Camera, Distortion
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections, lens_distortion
 from photostrip.strip.image_coordinates.corrections import Bending, Refined, curvature_constant, refraction_constant
@@ -238,20 +238,6 @@ def test_distortion_that_folds_the_photo_is_refused(direction: str, k1: float, f
             refine(np.array([[10.0, 10.0]]), camera)
 
 
-def test_only_the_format_and_the_measured_points_must_have_an_inverse() -> None:
-    folds_at_105 = brown(FORWARD, (-1 / (3 * 105.0**2), 0.0, 0.0))
-    small = Camera("small", 50.0, format=(100.0, 100.0), distortion=folds_at_105)
-    assert not lens_distortion.faults(small)
-    assert lens_distortion.faults(replace(small, format=(160.0, 160.0)))
-    assert lens_distortion.faults(replace(small, principal_point=(40.0, 40.0)))
-    assert lens_distortion.faults(small, 110.0)
-    assert not lens_distortion.faults(replace(small, format=None))
-    with pytest.raises(InputError, match="folds"):
-        refine(np.array([[0.0, 110.0]]), replace(small, format=None))
-    with pytest.raises(GeometryError, match="no inverse at some point"):
-        corrections.distort(np.array([[90.0, 0.0]]), small)  # the largest ideal radius is 70 mm
-
-
 # ------------------------------------------------------------------------------------------- refraction
 
 
@@ -344,30 +330,7 @@ def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg:
     assert found[0, 1] == pytest.approx(seen + missing, abs=0.01 * missing)
 
 
-def test_curvature_tells_its_largest_shift_and_needs_heights() -> None:
-    image = np.array([[140.0, 0.0], [10.0, 0.0]])
-    settings = ImageCorrectionSettings(earth_radius=6370000.0, flying_height=4590.0, ground_height=0.0)
-    assert refine(image, PLAIN, settings).largest_um == {"earth curvature": pytest.approx(42.2, abs=0.1)}
-    with pytest.raises(InputError, match="earth_curvature: flying height and height of the ground are not known"):
-        refine(image, PLAIN, ImageCorrectionSettings(earth_radius=6370000.0))
-    with pytest.raises(InputError, match="earth_curvature: the flying height 4590 m is not above the ground, 5000 m"):
-        refine(image, PLAIN, replace(settings, ground_height=5000.0))
-
-
 # ------------------------------------------------------------------------------------------- tables of photos
-
-
-def test_each_photo_gets_its_camera() -> None:
-    first = replace(PLAIN, name="first", principal_point=(1.0, 0.0))
-    second = replace(PLAIN, name="second", distortion=brown(FORWARD, (1e-7, 0.0, 0.0)))
-    image = np.array([[30.0, 40.0], [60.0, 80.0]])
-    used = {"a": first, "b": second, "c": PLAIN, "d": first}
-    found = corrections.refine(observed(image, tuple(used)), used, ImageCorrectionSettings())
-    expected = np.vstack([corrections.undistort(image, camera) for camera in used.values()])
-    assert np.array_equal(found.observations.xy, expected)
-    assert np.array_equal(found.observations.xy[4:6], image)
-    assert found.largest_um == {"principal point": pytest.approx(1000.0), "distortion": pytest.approx(100.0)}
-    assert np.array_equal(found.observations.sigma, np.full((8, 2), 0.005))
 
 
 def test_every_fault_of_every_camera_is_told_at_once() -> None:

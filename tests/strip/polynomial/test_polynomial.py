@@ -187,17 +187,6 @@ def test_every_term_can_be_dropped_and_stands_in_the_help_and_on_the_page() -> N
     assert f"${', '.join(POWERS)}$" in (ROOT / "docs/method.md").read_text(encoding="utf-8")
 
 
-def test_the_degree_asked_for_is_the_degree() -> None:
-    xyz = layout(SEVEN)
-    one = problem(xyz, xyz + bent(xyz, 3.0, 2))
-    for degree in (1, 2, 3):
-        found = fit(one, PolynomialSettings(str(degree)))
-        assert found.degree == degree
-        assert found.evidence[-1].accepted
-    assert found.reach == pytest.approx((xyz[:, 0].min(), xyz[:, 0].max()))
-    assert found.stations == (7, 7)
-
-
 # -------------------------------------------------------------------------------------- what evidence says
 
 
@@ -247,19 +236,6 @@ def test_the_f_test_is_that_of_two_sums_of_squares() -> None:
         ratio = ((squares[before] - squares[after]) / (squares[after] / (21 - after))).sum() / gained
         assert evidence.f == pytest.approx(ratio, rel=1e-6)
         assert evidence.p == pytest.approx(f_distribution.sf(ratio, gained, left), rel=1e-6, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("p", "rich", "taken"), [(0.04, 0.9, True), (0.09, 0.9, False), (0.001, 1.1, False), (float("nan"), 0.9, False)]
-)
-def test_the_f_test_and_left_out_control_must_agree_on_a_step(
-    p: float, rich: float, monkeypatch: pytest.MonkeyPatch, *, taken: bool
-) -> None:
-    xyz = layout(SEVEN)
-    one = noisy(1, bent(xyz, 2.0, 2), xyz)
-    monkeypatch.setattr(correction, "_f_test", lambda *_: (1.0, p))
-    monkeypatch.setattr(correction, "_left_out_errors", lambda *_: ([1.0] + [rich] * 9, "band"))
-    assert (fit(one, PolynomialSettings()).degree > 0) == taken
 
 
 def left_out_by_refitting(
@@ -334,17 +310,6 @@ def test_auto_is_never_worse_than_the_similarity_by_more_than_noise(bands_: int)
     auto, forced = (np.sqrt(squares[name] / squares["similarity"]) for name in ("auto", "3"))
     assert 1.0 <= auto < 1.25
     assert auto < forced  # the highest degree pays for every term
-
-
-def test_with_a_deformation_auto_takes_nearly_all_of_it_out() -> None:
-    xyz = layout(SEVEN)
-    anywhere = np.random.default_rng(1).uniform([-9000, -1400, 0], [9000, 1400, 200], (40, 3))
-    for power in (2, 3):
-        given_ = xyz + bent(xyz, 5.0, power) + np.random.default_rng(power).normal(0, 0.05, xyz.shape)
-        similarity = Similarity.from_points(xyz, given_)
-        found = fit(problem(similarity(xyz), given_, sigma=0.05), PolynomialSettings())
-        error = found(similarity(anywhere)) - anywhere - bent(anywhere, 5.0, power)
-        assert 0.005 < np.sqrt((error**2).mean()) < 0.08
 
 
 # ------------------------------------------------------------------------------- plan and height control

@@ -20,7 +20,6 @@ from photostrip.points import PhotoPoints
 from photostrip.strip.error_propagation.image_variance import image_variance
 from photostrip.strip.relative_orientation.orientation import (
     assess_pairs,
-    orient_again,
     orient_pairs,
     orient_unchecked,
 )
@@ -57,7 +56,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from photostrip.strip.relative_orientation.orientation import Orientation
-    from photostrip.strip.relative_orientation.pairs import Pairs
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]
@@ -90,10 +88,6 @@ def refusal(observations: PhotoPoints, focal: float = 100.0) -> GeometryError:
     assert "photos 1 and 2" in str(caught.value)
     assert caught.value.photos == BOTH
     return caught.value
-
-
-def single(observations: PhotoPoints, focal: float) -> Pairs:
-    return collect_pairs(observations, observations.photo_ids, focal)
 
 
 # ------------------------------------------------------------------------------------------- published
@@ -269,36 +263,6 @@ def test_a_y_parallax_has_the_variance_across_the_base(sigma: tuple[float, float
     assert pairs.weight == pytest.approx((np.median(sigma) / across) ** 2, rel=0.25)
 
 
-def test_weights_come_from_the_standard_deviations() -> None:
-    observations = of_arrays(np.eye(6, 2), np.eye(6, 2) - 70)
-    sigma = np.full((12, 2), 0.005)
-    sigma[3] = 0.010  # the left image point of p3
-    pairs = single(replace(observations, sigma=sigma), 100.0)
-    assert np.allclose(np.delete(pairs.weight, 3), 1)
-    assert pairs.weight[3] == pytest.approx(2 / (1 + 4))  # of a difference of two coordinates
-
-
-def test_a_point_of_no_weight_does_not_count() -> None:
-    pairs = true_pairs(
-        np.random.default_rng(5), sigma=5 * MICROMETRE, counts=(3,) * 6, tilt_deg=3.0, kappa_deg=0.0
-    ).pairs
-    everything = of_arrays(pairs.left, pairs.right)
-    bad = pairs.left.copy()
-    bad[4] += [0.0, 3.0]
-    oriented = orient(of_arrays(bad, pairs.right), 153.0)
-    weight = oriented.pairs.weight.copy()
-    weight[4] = 0
-    without = orient_again(oriented, weight, np.array([0]))
-    rest = np.delete(np.arange(18), 4)
-    alone = orient(of_arrays(pairs.left[rest], pairs.right[rest]), 153.0)
-    assert np.allclose(without.elements, alone.elements, rtol=0, atol=1e-11)
-    assert np.allclose(without.sigma0, alone.sigma0, rtol=1e-6)
-    assert np.allclose(without.redundancy[rest], alone.redundancy, rtol=0, atol=1e-6)
-    assert without.points_used.tolist() == [17]
-    assert abs(without.parallax[4]) > 2.5  # still told, with its whole error
-    assert np.abs(orient(everything, 153.0).parallax).max() < 0.03
-
-
 # --------------------------------------------------------------------------------------------- weak pairs
 
 
@@ -372,16 +336,6 @@ def test_a_mirrored_photo(mirror: list[int]) -> None:
     assert error.code == "behind-cameras"
     assert "behind the cameras" in str(error)
     assert "mirrored" in str(error)
-
-
-def test_the_refused_pair_of_a_strip_is_the_one_named() -> None:
-    flown = fly(3, 5, extra=20)
-    xy = flown.observations.xy.copy()
-    third = flown.observations.photo == 3
-    xy[third] = np.random.default_rng(1).permutation(xy[third])
-    with pytest.raises(GeometryError) as caught:
-        orient(replace(flown.observations, xy=xy), flown.focal)
-    assert caught.value.photos == ("103", "104")  # the first of the two pairs that photo 104 spoils
 
 
 def test_the_same_photo_measured_twice() -> None:

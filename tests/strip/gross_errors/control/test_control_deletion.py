@@ -18,7 +18,6 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
-from photostrip.result.document import document_of
 from photostrip.strip.absolute_orientation import Targets
 from photostrip.strip.error_propagation.control_errors import Misclosures
 from photostrip.strip.error_propagation.strip_at_control import StripAtControl
@@ -158,15 +157,6 @@ def test_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None
     assert detectable[1, 2] == pytest.approx((limit + norm.ppf(0.8)) * sigma[0] * max(1, after / 16) ** 0.5, rel=1e-5)
 
 
-def test_a_majority_is_never_rejected() -> None:
-    """Half of the heights may be wrong, not more."""
-    whole = adjusted_jointly(drawn(2, points=12))
-    heights = tuple(range(2, 36, 3))
-    assert whole.allows(heights[:6])
-    assert not whole.allows(heights[:7])
-    assert not whole.allows((0, 1, 3, 4, 6, 7, 9, 10, 12, 13, 15, 16, 18, 19))
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_no_exchange_of_one_part_explains_more_than_the_exchanged_ones(seed: int) -> None:
     strip = drawn(seed, worse=5.0)
@@ -207,22 +197,3 @@ def test_a_bend_takes_no_good_control() -> None:
     assert not adjusted(bent, names, {}).strips[0].wrong_control
     found = adjusted(bent, names, {"p6_1": (0.0, 0.0, 8.0)}).strips[0].wrong_control
     assert [names[each.row] for each in found] == ["p6_1"]
-
-
-@pytest.mark.slow
-def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_coordinates() -> None:
-    """Its other ray leads all along the error; nothing else contradicts it."""
-    strip = flown()
-    o = strip.observations
-    (row,) = np.flatnonzero((o.photo == 0) & (o.point == o.point_ids.index("p0_1")))
-    xy = o.xy.copy()
-    xy[row, 0] += 0.2
-    spoiled = replace(strip, observations=replace(o, xy=xy))
-    result = adjusted(spoiled, strip.bands(0, 3, 6, 9, 12), {})
-    assert not result.strips[0].wrong_control
-    assert "p0_1" not in result.strips[0].control.ids
-    assert result.not_determined == {"p0_1": "its given coordinates contradict one of its two rays"}
-    told = [note for note in result.notes if note.code in {"control-rejected", "control-image"}]
-    assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (o.photo_ids[0],), ("p0_1",))]
-    (line,) = [line for line in document_of(result)["rejected"] if line["stage"] == "control"]
-    assert line["blamed"] == [o.photo_ids[0]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -109,23 +108,3 @@ def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> Non
     row_of = {name: row for row, name in enumerate(control.ids)}
     rows = [row_of[name] for name in kept.ids]
     assert np.array_equal(kept.use, control.use[rows] & ~bad[rows])
-
-
-@pytest.mark.slow
-def test_a_scale_that_may_be_wrong_does_not_cost_sound_control() -> None:
-    """One of the two points that join the models is wrong along the base: which, nobody can tell."""
-    strip = flown(extra=20)
-    o = strip.observations
-    on = {number: set(o.photo[o.point == number].tolist()) for number in range(len(o.point_ids))}
-    joining = {strip.at["p5_1"], strip.at["p5_-1"]}
-    others = [number for number, photos in on.items() if {4, 5, 6} <= photos and number not in joining]
-    keep = ~(np.isin(o.point, others) & (o.photo == 6))
-    xy = o.xy.copy()
-    xy[(o.point == strip.at["p5_1"]) & (o.photo == 5), 0] += 0.3
-    few = replace(o, photo=o.photo[keep], point=o.point[keep], xy=xy[keep], sigma=o.sigma[keep])
-    result = adjusted(replace(strip, observations=few))
-    assert not result.strips[0].wrong_control
-    assert [note.photos for note in result.notes if note.code == "contradicting-joint"] == [("106",)]
-    result = adjusted(replace(strip, observations=few), {"p12_0": (0.0, 0.0, 8.0)})
-    assert not result.strips[0].wrong_control
-    assert list(result.not_determined) == ["p12_0"]  # below the last photo: its height or its image there

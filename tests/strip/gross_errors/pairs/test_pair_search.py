@@ -124,30 +124,6 @@ def test_a_fifth_of_wrong_points_comes_out_and_nothing_else(size: float) -> None
     assert np.median(flown.errors(found.orientation.elements)) < 1.5 * np.median(clean)
 
 
-@pytest.mark.slow
-def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_looks_wrong() -> None:
-    flown = level(6, 50, (3,) * 6)
-    errors = np.zeros((50, 18))
-    errors[:, 6:8] = 0.2  # two of three points of zone 3
-    pairs = spoiled(flown, errors)
-    found = examined(pairs)
-    out = ~found.orientation.used.reshape(50, 18)
-    assert out[:, 6:8].all()
-    assert out.sum() <= 102
-    assert {int(found.zone[r.row]) for r in found.rejections if not r.readmitted} == {3}
-    by_tau = ~examined(pairs, RelativeSettings(screening="tau")).orientation.used.reshape(50, 18)
-    assert not by_tau[:, 6:8].all(axis=1).any()
-
-
-def test_the_estimated_size_is_that_of_the_error() -> None:
-    flown = level(7, 30)
-    errors = np.zeros((30, 16))
-    errors[:, 9] = 0.3
-    sizes = [r.size for r in examined(spoiled(flown, errors)).rejections]
-    assert np.mean(sizes) == pytest.approx(0.3, abs=0.01)  # y parallax is left minus right
-    assert np.std(sizes) > 1 * MICROMETRE
-
-
 def test_clean_pairs_lose_next_to_nothing() -> None:
     found = examined(level(8, 1000).pairs)
     touched = np.unique(found.orientation.pairs.pair[~found.orientation.used])
@@ -161,12 +137,6 @@ def test_a_sigma_stated_far_too_small_costs_no_good_points(understated: float) -
     found = examined(level(9, 60).pairs, sigma=SIGMA / understated)
     assert found.scatter.found == pytest.approx(np.sqrt(2) * SIGMA, rel=0.12)
     assert (~found.orientation.used).mean() < 0.002
-
-
-def test_a_sigma_stated_too_large_is_kept() -> None:
-    found = examined(level(10, 20).pairs, sigma=3 * SIGMA)
-    assert found.scatter.by_pair == pytest.approx(3 * np.sqrt(2) * SIGMA)
-    assert np.isnan(found.scatter.found)
 
 
 def test_errors_that_cannot_be_found_are_suspected() -> None:
