@@ -60,7 +60,7 @@ _TEXTS = (
     (
         "terrestrial",
         "Directions of a phototheodolite, displacements between epochs.",
-        "photostrip terrestrial displacement survey.yaml -o result",
+        "photostrip terrestrial displacement survey.yaml -o survey.svg",
     ),
     (
         "sources",

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 Form = Literal["text", "md", "json", "csv"]
 FORMS = {".json": "json", ".csv": "csv", ".md": "md", ".txt": "text", ".html": "html"}  # by the ending of a file
-PICTURES = (".svg", ".png")
 
 Printed = Annotated[Form, typer.Option("--format", help="How the answer is printed.")]
 Assigned = Annotated[
@@ -36,17 +35,17 @@ Written = Annotated[
 ]
 
 
-def check_target(output: Path | None, depfile: Path | None = None, *, pictures: bool = False) -> bool:
+def check_target(output: Path | None, depfile: Path | None = None, pictures: tuple[str, ...] = ()) -> bool:
     """Refuse what cannot be written before anything is computed; return whether a picture is wanted."""
     require_target(depfile, output)
     if output is None or output.suffix.lower() in FORMS:
         return False
-    if pictures and output.suffix.lower() in PICTURES:
-        from photostrip.report.pictures.plans import check_picture
+    if output.suffix.lower() in pictures:
+        from photostrip.report.pictures.drawing import check_matplotlib
 
-        check_picture(output)
+        check_matplotlib("--output", f"{output.name}: ")
         return True
-    known = ", ".join([*FORMS, *(PICTURES if pictures else ())])
+    known = ", ".join([*FORMS, *pictures])
     raise typer.BadParameter(f"nothing is written as '{output.suffix}': the name may end in {known}", param_hint="-o")
 
 

@@ -38,7 +38,7 @@ def plan(
     with failures_as(form):
         from photostrip.library.plan import planned
 
-        picture = check_target(output, depfile, pictures=True)
+        picture = check_target(output, depfile, (".svg", ".png"))
         found = planned(kind, file, assignments or [])
         if picture and output is not None:
             from photostrip.formats.text.writing import write_text

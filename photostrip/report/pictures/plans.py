@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.notes import Document
-from photostrip.report.pictures.drawing import as_png, as_svg, check_matplotlib, drawn_alike, isolines, new_figure
+from photostrip.report.pictures.drawing import as_png, as_svg, drawn_alike, isolines, new_figure
 from photostrip.report.pictures.plan_strip import strip_figure
 from photostrip.report.pictures.style import SERIES, SMALL_TEXT, USES
 
@@ -21,17 +20,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 ARROWS = 8  # along an axis
-ENDINGS = (".png", ".svg")
-
-
-def is_picture(path: Path) -> bool:
-    """Whether a file name asks for a picture."""
-    return path.suffix.lower() in ENDINGS
-
-
-def check_picture(path: Path) -> None:
-    """Refuse a picture that cannot be drawn, before anything is computed."""
-    check_matplotlib("--output", f"{path.name}: ")
 
 
 def plan_picture(document: Document, ending: str) -> bytes:

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
-from photostrip.report.pictures.drawing import as_svg, check_matplotlib, drawn_alike, isolines, new_figure
+from photostrip.report.pictures.drawing import as_svg, drawn_alike, isolines, new_figure
 from photostrip.report.pictures.style import MOVED, NOT_SIGNIFICANT, SMALL_TEXT, STABLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FINE = 81  # points across the photo
 ARROW_SHARE = 0.12  # of the size of the picture: length of the longest displacement
 
 
-def check_plot(file: str) -> None:
-    """Refuse a picture that cannot be drawn or has another ending than .svg, before anything is computed."""
-    if not file.lower().endswith(".svg"):
-        message = "pictures are written as SVG"
-        raise InputError(Fault(message, "plot-format", file, key="--plot", expected="a name that ends in .svg"))
-    check_matplotlib("--plot")
+def terrestrial_picture(document: Document) -> str:
+    """Draw what has a picture: the accuracy over a photo, displacements."""
+    return DRAWINGS[document["kind"]](document)
 
 
 @drawn_alike()
-def accuracy_plot(document: Document, fine: Document) -> str:
+def accuracy_plot(document: Document) -> str:
     """Draw the required accuracy of directions, known on a fine grid over the whole photo."""
     camera = document["camera"]
     title = (
@@ -35,15 +31,15 @@ def accuracy_plot(document: Document, fine: Document) -> str:
         f" {document['image_sigma_um']:g} µm in the photo ({document['formulas']})"
     )
     columns = {"horizontal_arcsec": "m_lambda, seconds of arc", "vertical_arcsec": "m_beta, seconds of arc"}
-    return _over_the_photo(11, title, fine["points"], columns)
+    return _over_the_photo(11, title, document["points"], columns)
 
 
 @drawn_alike()
-def theodolite_plot(document: Document, fine: Document) -> str:
-    """Draw the image accuracy that a theodolite supports over the photo; parameters as of ``accuracy_plot``."""
+def theodolite_plot(document: Document) -> str:
+    """Draw the image accuracy that a theodolite supports over the photo, known on a fine grid."""
     given = document["theodolite"]
     title = f"{document['camera']['name']}: {given['horizontal_arcsec']:g}″ in one round, {given['rounds']} rounds"
-    return _over_the_photo(6.5, title, fine["points"], {"supported_um": "supported image accuracy, µm"})
+    return _over_the_photo(6.5, title, document["points"], {"supported_um": "supported image accuracy, µm"})
 
 
 def _over_the_photo(width: float, title: str, points: list[Document], columns: dict[str, str]) -> str:
@@ -64,12 +60,12 @@ def _over_the_photo(width: float, title: str, points: list[Document], columns: d
 @drawn_alike()
 def displacement_plot(document: Document) -> str:
     """Draw the displacements in plan and in elevation, and as time series."""
-    axes_names = document["frame"]["axes"]
+    axes_names = document["axes"]
     up = axes_names.index("up")
     right, ahead = sorted(
         (place for place in range(3) if place != up), key=lambda n: axes_names[n] in {"north", "ahead"}
     )
-    epochs = [epoch["id"] for epoch in document["epochs"]]
+    epochs = document["epochs"]
     figure = new_figure(13, 4.8, f"{document['name']}: displacements from {epochs[0]} to {epochs[-1]}")
     plan = figure.add_subplot(1, 3, 1, aspect="equal", title="plan")
     view = figure.add_subplot(1, 3, 2, aspect="equal", title="elevation")
@@ -81,9 +77,10 @@ def displacement_plot(document: Document) -> str:
 
 def _arrows(axes: Axes, document: Document, places: tuple[int, int], *, ellipses: bool) -> None:
     """Draw points with their displacements, enlarged, and their confidence ellipses, enlarged alike."""
-    names = document["frame"]["axes"]
-    found = [(point, point["epochs"][0], point["epochs"][-1].get("since_first")) for point in document["points"]]
-    shown = [(point, place, step) for point, place, step in found if step is not None]
+    names, epochs = document["axes"], document["epochs"]
+    first = {row["point"]: row for row in document["positions"] if row["epoch"] == epochs[0]}
+    last = [row for row in document["displacements"] if row["epoch"] == epochs[-1] and row["length"] is not None]
+    shown = [(row, first[row["point"]], row) for row in last]
     keys = ["xyz"[each] for each in places]
     start = np.array([[place[key] for key in keys] for _, place, _ in shown]).reshape(-1, 2)
     moved = np.array([[step[f"d{key}"] for key in keys] for _, _, step in shown]).reshape(-1, 2)
@@ -107,8 +104,8 @@ def _arrows(axes: Axes, document: Document, places: tuple[int, int], *, ellipses
         )
     for (point, _, step), base, shift in zip(shown, start, moved, strict=True):
         _name_beside(axes, point, (base[0], base[1]), (3, 3))
-        if ellipses and step["ellipse"]["major"] is not None:
-            _ellipse(axes, base + shift * factor, step["ellipse"], factor)
+        if ellipses and step["ellipse_major"] is not None:
+            _ellipse(axes, base + shift * factor, step, factor)
     axes.set_xlabel(f"{names[places[0]]}, m (displacements × {factor:g})")
     axes.set_ylabel(f"{names[places[1]]}, m")
     axes.margins(0.15)
@@ -122,17 +119,18 @@ def _colour(point: Document, step: Document | None) -> str:
 
 
 def _name_beside(axes: Axes, point: Document, place: tuple[Any, Any], shift: tuple[int, int]) -> None:
-    axes.annotate(point["id"], place, xytext=shift, textcoords="offset points", fontsize=SMALL_TEXT)
+    axes.annotate(point["point"], place, xytext=shift, textcoords="offset points", fontsize=SMALL_TEXT)
 
 
-def _ellipse(axes: Axes, centre: Any, ellipse: Document, factor: float) -> None:  # noqa: ANN401 (a row of an array)
+def _ellipse(axes: Axes, centre: Any, step: Document, factor: float) -> None:  # noqa: ANN401 (a row of an array)
     from matplotlib.patches import Ellipse
 
+    major, minor = step["ellipse_major"], step["ellipse_minor"]
     patch = Ellipse(
         (float(centre[0]), float(centre[1])),
-        2 * factor * ellipse["minor"],
-        2 * factor * ellipse["major"],
-        angle=-ellipse["azimuth_deg"],  # azimuths run clockwise from the upright axis
+        2 * factor * minor,
+        2 * factor * major,
+        angle=-step["azimuth_deg"],  # azimuths run clockwise from the upright axis
         fill=False,
         linewidth=0.6,
         edgecolor=NOT_SIGNIFICANT,
@@ -148,17 +146,18 @@ def _round_down(value: float) -> float:
 
 def _series(axes: Axes, document: Document) -> None:
     """Draw the length of each displacement over the epochs."""
-    epochs = document["epochs"]
-    timed = all("time" in epoch for epoch in epochs)
-    times = [epoch["time"] if timed else number for number, epoch in enumerate(epochs)]
-    for point in document["points"]:
-        steps = [entry.get("since_first") for entry in point["epochs"]]
-        lengths = [0.0, *(np.nan if step is None else step["length"] for step in steps[1:])]
-        axes.plot(times, lengths, marker="o", markersize=3, linewidth=0.8, color=_colour(point, steps[-1]))
-        _name_beside(axes, point, (times[-1], lengths[-1]), (3, 0))
+    epochs, timed = document["epochs"], bool(document["times"])
+    times = [document["times"][epoch] if timed else number for number, epoch in enumerate(epochs)]
+    series: dict[str, list[Document]] = {}
+    for row in document["displacements"]:
+        series.setdefault(row["point"], []).append(row)
+    for steps in series.values():
+        lengths = [0.0, *(np.nan if step["length"] is None else step["length"] for step in steps)]
+        axes.plot(times, lengths, marker="o", markersize=3, linewidth=0.8, color=_colour(steps[-1], steps[-1]))
+        _name_beside(axes, steps[-1], (times[-1], lengths[-1]), (3, 0))
     if not timed:
-        axes.set_xticks(times, [epoch["id"] for epoch in epochs])
-    unit = document["units"]["rate"].rpartition(" ")[2]
+        axes.set_xticks(times, epochs)
+    unit = document["time_unit"]
     axes.set_xlabel(unit if timed else "epoch")
     axes.set_ylabel("m")
     axes.legend(handles=_legend(), fontsize=SMALL_TEXT)
@@ -169,3 +168,10 @@ def _legend() -> list[Any]:
 
     words = ((MOVED, "moved"), (NOT_SIGNIFICANT, "not significant"), (STABLE, "stable"))
     return [Line2D([], [], color=colour, marker="o", markersize=3, label=word) for colour, word in words]
+
+
+DRAWINGS: dict[str, Callable[[Document], str]] = {
+    "direction-accuracy": accuracy_plot,
+    "theodolite-accuracy": theodolite_plot,
+    "displacements": displacement_plot,
+}
