@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Form = Literal["text", "md", "json", "csv"]
 FORMS = {".json": "json", ".csv": "csv", ".md": "md", ".txt": "text", ".html": "html"}  # by the ending of a file
+PICTURE = ".svg"
 
 Printed = Annotated[Form, typer.Option("--format", help="How the answer is printed.")]
 Assigned = Annotated[
@@ -35,17 +36,14 @@ Written = Annotated[
 ]
 
 
-def check_target(output: Path | None, depfile: Path | None = None, pictures: tuple[str, ...] = ()) -> bool:
+def check_target(output: Path | None, depfile: Path | None = None, *, picture: bool = False) -> bool:
     """Refuse what cannot be written before anything is computed; return whether a picture is wanted."""
     require_target(depfile, output)
     if output is None or output.suffix.lower() in FORMS:
         return False
-    if output.suffix.lower() in pictures:
-        from photostrip.report.pictures.drawing import check_matplotlib
-
-        check_matplotlib("--output", f"{output.name}: ")
+    if picture and output.suffix.lower() == PICTURE:
         return True
-    known = ", ".join([*FORMS, *pictures])
+    known = ", ".join([*FORMS, PICTURE] if picture else FORMS)
     raise typer.BadParameter(f"nothing is written as '{output.suffix}': the name may end in {known}", param_hint="-o")
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from photostrip.sheets.sheet import Sheet
     from photostrip.terrestrial.frame import Phototheodolite
 
-FINE = 81  # points across the picture of a photo
-
 
 class Computed(NamedTuple):
     """What was computed, from which files, with what was to be said of it."""
@@ -30,7 +28,7 @@ class Computed(NamedTuple):
 def terrestrial(
     kind: TerrestrialKind, path: Path | None, assignments: Sequence[str], *, fine: bool = False
 ) -> Computed:
-    """Compute what a file asks for, or the keys that are set alone; over the photo on a `fine` grid."""
+    """Compute what a file asks for, or the keys that are set alone."""
     from photostrip.project.terrestrial import directions as keys
     from photostrip.project.terrestrial.cameras import known_presets, only_camera
     from photostrip.project.yaml.reading import read_keys
@@ -58,12 +56,12 @@ def terrestrial(
             sheet = sheets.photo_sheet(camera, asked.attitude, points.ids, points.values)
         case "accuracy":
             needed, reading = read_keys(keys.AccuracyFile, path, assignments)
-            camera, grid = _over_photo(needed, reading, fine=fine)
+            camera, grid = _over_photo(needed, reading)
             sigma_mm, printed = needed.sigma_um / 1000, needed.as_printed
             sheet = sheets.accuracy_sheet(camera, needed.attitude, sigma_mm, grid, as_printed=printed)
         case "theodolite":
             vouched, reading = read_keys(keys.TheodoliteFile, path, assignments)
-            camera, grid = _over_photo(vouched, reading, fine=fine)
+            camera, grid = _over_photo(vouched, reading)
             sigma = None if vouched.sigma_um is None else vouched.sigma_um / 1000
             sheet = sheets.theodolite_sheet(camera, vouched.attitude, vouched.measured, sigma, grid)
         case "orientation":
@@ -71,10 +69,8 @@ def terrestrial(
     return Computed(sheet, reading.files, reading.findings.notes)
 
 
-def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading, *, fine: bool) -> tuple[Phototheodolite, Grid]:
+def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple[Phototheodolite, Grid]:
     """Return the camera, and the grid of a table over its photo."""
-    import numpy as np
-
     from photostrip.project.terrestrial.cameras import only_camera
     from photostrip.project.terrestrial.directions import MOST_POINTS
     from photostrip.terrestrial.accuracy import grid
@@ -85,8 +81,6 @@ def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading, *, fine:
         message = f"a step of {given.step:g} mm gives more than {MOST_POINTS} points"
         reading.refuse(("step",), message, "range", expected="a larger step")
         reading.findings.stop()
-    if fine:
-        return camera, (np.linspace(-width / 2, width / 2, FINE), np.linspace(-height / 2, height / 2, FINE))
     return camera, grid((width, height), given.step, level=given.level)
 
 

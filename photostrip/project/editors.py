@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_origin
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from photostrip.project.schema.sections import Section
+from photostrip.project.schema.sections import Section, bare, is_section
 from photostrip.project.schema.values import AUTO
 
 if TYPE_CHECKING:
@@ -70,3 +71,15 @@ class _ForEditors(GenerateJsonSchema):
         if default is None:
             return {**found, "default": "auto"} if AUTO in found.get("anyOf", ()) else found
         return {**found, "default": {} if isinstance(default, Section) else default}
+
+
+def single_keys(kind: type[Section] | None = None, above: str = "") -> Iterator[str]:
+    """Return the paths of all single values of a project file; below lists and names of users there are none."""
+    from photostrip.project.schema.project_file import ProjectFile
+
+    for name, field in (kind or ProjectFile).model_fields.items():
+        inner = bare(field.annotation)
+        if is_section(inner):
+            yield from single_keys(inner, f"{above}{name}.")
+        elif get_origin(inner) not in {list, dict, tuple}:
+            yield f"{above}{name}"

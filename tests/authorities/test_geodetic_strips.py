@@ -15,7 +15,7 @@ from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.run import triangulate
 from photostrip.strip.polynomial import correction
 from tests.strips import control_points, measured
-from tests.vectors import section, vector
+from tests.vectors import vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,7 +101,3 @@ def test_auto_is_not_worse_than_the_similarity(frame: str) -> None:
         for kind in ("polynomial", "similarity")
     )
     assert auto < 1.05 * similarity
-
-
-def test_all_examples_are_here() -> None:
-    assert len(section("strip_geodetic")) == 2

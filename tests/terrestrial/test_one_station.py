@@ -105,12 +105,6 @@ def test_standard_deviations_are_the_scatter_and_the_test_keeps_its_level(*, com
     assert moved.mean() == pytest.approx(0.05, abs=0.012)
 
 
-@pytest.mark.slow
-def test_a_few_drawn_surveys_scatter_as_stated() -> None:
-    values, _, sigma = drawn(36, complete=True)
-    assert (values.std(axis=0) / sigma).mean() == pytest.approx(1.0, abs=0.1)
-
-
 def test_stable_points_that_say_nothing_of_the_turn_are_refused() -> None:
     for number in (1, 2):
         stable = np.arange(6) < number

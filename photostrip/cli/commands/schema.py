@@ -33,7 +33,7 @@ def schema(
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of the project file: every key, its unit, its default.
+    """Print the JSON Schema of the project file, for editors.
 
     An editor that knows JSON Schema completes keys and explains them: write the schema to a file and begin the
     project file with `# yaml-language-server: $schema=photostrip.schema.json`.

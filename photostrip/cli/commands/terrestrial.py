@@ -12,8 +12,6 @@ from photostrip.cli.options import RuleOfOutput, Silent
 from photostrip.cli.sheets import Assigned, Printed, Written, check_target, deliver, say, write_rule
 from photostrip.terrestrial import TerrestrialKind
 
-DRAWN = ("accuracy", "theodolite", "displacement")
-
 
 def terrestrial(
     *,
@@ -40,15 +38,13 @@ def terrestrial(
     with failures_as(form):
         from photostrip.library.terrestrial import terrestrial as computed
 
-        picture = check_target(output, depfile, (".svg",) if kind in DRAWN else ())
+        picture = check_target(output, depfile, picture=kind == "displacement")
         found = computed(kind, file, assignments or [])
         if picture and output is not None:
             from photostrip.formats.text.writing import write_text
-            from photostrip.report.pictures.terrestrial import terrestrial_picture
+            from photostrip.report.pictures.displacements import displacement_picture
 
-            over_photo = kind != "displacement"
-            drawn = computed(kind, file, assignments or [], fine=True) if over_photo else found
-            write_text(output, terrestrial_picture(drawn.sheet.document()))
+            write_text(output, displacement_picture(found.sheet.document()).file())
         if form not in {"text", "md", "json"} or kind != "displacement":  # the sheet of displacements has its notes
             say(found.notes, quiet=quiet)
         deliver(found.sheet, form, output, quiet=quiet)

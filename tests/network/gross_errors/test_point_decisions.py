@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,9 +20,8 @@ from photostrip.network.gross_errors.point_decisions import (
     PointRays,
 )
 from photostrip.network.reliability import Limit
-from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
-from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors.pairs.deletion import LIKELIER
+from photostrip.rejection import SEVERAL_RAYS, WRONG_RAY
+from photostrip.statistics import normal_quantile
 from photostrip.strip.resection.collinearity import KnownPhotos, derivatives
 from tests.loops import nonempty
 
@@ -186,142 +184,3 @@ def test_of_three_rays_the_wrong_one_is_found_across_the_base_and_not_along(
     assert along.cause in {WRONG_RAY, SEVERAL_RAYS}
     assert along.out[place]
     assert along.out.all() == (along.cause == SEVERAL_RAYS)
-
-
-def test_two_rays_that_do_not_meet_are_both_left_out() -> None:
-    found = decide(spoiled(a_point(5, 2), {(0, 1): 30.0}), limit())
-    assert found.out.tolist() == [True, True]
-    assert found.cause == TWO_RAYS
-    assert found.size[:, 1] == pytest.approx([15.0, -15.0], abs=2.0)  # half of the y parallax each
-
-
-def with_control(point: PointRays, axes: slice) -> PointRays:
-    """Give the point some of its three coordinates."""
-    known = np.eye(3)[axes] * 1e5
-    return replace(
-        point,
-        misfit=np.append(point.misfit, np.zeros(len(known))),
-        by_point=np.concatenate([point.by_point, known]),
-        of_photos=np.pad(point.of_photos, (0, len(known))),
-        inside=np.append(point.inside, np.zeros(len(known), bool)),
-    )
-
-
-def test_control_says_which_of_two_rays_is_wrong() -> None:
-    point = spoiled(a_point(5, 2), {(0, 0): 30.0})
-    assert not decide(point, limit()).out.any()  # an error along the base shows nowhere
-    found = decide(with_control(point, slice(0, 3)), limit())
-    assert found.out.tolist() == [True, False]
-    assert found.size[0, 0] == pytest.approx(30.0, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("rays", "axes", "cause"),
-    [
-        pytest.param(1, slice(0, 3), WRONG_RAY, id="one ray, given in full"),
-        pytest.param(2, slice(2, 3), TWO_RAYS, id="two rays, given in height"),
-    ],
-)
-def test_little_control_finds_an_error_and_cannot_tell_the_ray(rays: int, axes: slice, cause: str) -> None:
-    found = decide(with_control(spoiled(a_point(5, rays), {(0, 1): 40.0}), axes), limit())
-    assert found.out.all()
-    assert found.cause == cause
-    assert found.size.shape == (rays, 2)
-    assert np.isfinite(found.size).all()
-
-
-@pytest.mark.parametrize(("wrong", "cause"), [(1, WRONG_RAY), (2, WRONG_RAY), (3, WRONG_RAY), (4, SEVERAL_RAYS)])
-def test_sets_of_up_to_three_rays_are_looked_for(wrong: int, cause: str) -> None:
-    errors = {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(wrong)}
-    found = decide(spoiled(a_point(11, 9), errors), limit())
-    assert found.cause == cause
-    assert found.out.sum() == (wrong if cause == WRONG_RAY else 9)
-
-
-@pytest.mark.parametrize(("times", "cause"), [(0.75, SEVERAL_RAYS), (1.5, WRONG_RAY)])
-def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float, cause: str) -> None:
-    """An error along y of a ray, as large as makes the next best ray worse by a multiple of the limit."""
-    point = a_point(2)
-    level = Limit(1.0, 1.0, 1e-12, 1.0)  # nearly any scatter of the rest is allowed: the comparison decides alone
-
-    def next_best(size: float) -> float:
-        gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
-        left, _ = without(gap, weight, basis, np.arange(3)[:, None])
-        return float(np.partition(left, 1)[1] - left.min())
-
-    size = np.sqrt(times * LIKELIER / next_best(1.0))
-    assert next_best(size) == pytest.approx(times * 9.0)
-    assert next_best(size) < chi2_quantile(1 - level.alpha, 1)
-    assert decide(spoiled(point, {(0, 1): size}, 0.0), level).cause == cause
-
-
-def test_points_are_decided_on_together_as_one_by_one() -> None:
-    """Good points and points with one, two and too many wrong rays, that took part and that did not, in one batch."""
-    errors: list[dict[tuple[int, int], float]] = [
-        {},
-        {(0, 1): 60.0},
-        {(1, 1): 60.0, (3, 1): -90.0},
-        {(ray, 1): 50.0 * 2**ray for ray in range(4)},
-    ]
-    points = [spoiled(a_point(seed, 5), each, 1.0) for seed, each in enumerate(errors * 2)]
-    root = np.random.default_rng(1).normal(0, 0.1, (10, 10))
-    points = [
-        replace(each, of_photos=root @ root.T, inside=np.arange(10) < size) for size, each in enumerate(points, 2)
-    ]
-    decided = each_of(point_decisions.decide(together(*points), limit()))
-    for found, point in nonempty(zip(decided, points, strict=True)):
-        alone = decide(point, limit())
-        assert (found.out.tolist(), found.cause) == (alone.out.tolist(), alone.cause)
-        assert found.value == pytest.approx(alone.value)
-        assert found.size == pytest.approx(alone.size, nan_ok=True)
-    assert {each.cause for each in decided} == {"", WRONG_RAY, SEVERAL_RAYS}
-
-
-def test_points_with_as_many_rays_are_taken_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(point_decisions, "RAYS_AT_ONCE", 12)
-    sizes = [(2, 0), (3, 0), (2, 3), (3, 0), (20, 0)] * 6
-    rays, known = np.array(sizes).T
-    found = [each.tolist() for each in point_decisions.alike(rays, known)]
-    assert [len(each) for each in found] == [6, 6, 4, 4, 4, *[1] * 6]
-    assert sorted(place for each in found for place in each) == list(range(len(sizes)))
-    assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
-
-
-@pytest.mark.parametrize(("rays", "cause"), [(2, TWO_RAYS), (3, SEVERAL_RAYS)])
-def test_rays_that_meet_nowhere_are_left_out(rays: int, cause: str) -> None:
-    decided = point_decisions.decide(together(*(spoiled(a_point(seed, rays), {}) for seed in (1, 2))), limit())
-    good, nowhere = each_of(point_decisions.without_place(decided, np.array([False, True])))
-    assert not good.cause
-    assert not good.out.any()
-    assert good.value == decided.value[0]
-    assert nowhere.cause == cause
-    assert nowhere.out.all()
-    assert np.isnan([nowhere.value, *nowhere.size.ravel()]).all()
-
-
-@pytest.mark.parametrize(("rays", "count"), [(2, 1), (5, 2), (6, 3)])
-def test_every_ray_knows_the_sets_that_it_is_in(rays: int, count: int) -> None:
-    sets = point_decisions.ray_sets(rays, count)
-    assert sets.of_ray.shape == (rays, math.comb(rays - 1, count - 1))
-    assert (sets.rays[sets.of_ray, sets.place] == np.arange(rays)[:, None]).all()
-    assert all(len(set(each)) == len(each) for each in nonempty(sets.of_ray.tolist()))
-
-
-def test_the_likeliest_set_with_a_ray_says_its_error() -> None:
-    """Four of nine wrong: no set of three is enough, and all rays go, each with the error it would have."""
-    point = spoiled(a_point(11, 9), {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(4)})
-    found, (gap, weight, basis) = decide(point, limit()), point_decisions._misclosures(point)
-    sets = point_decisions.ray_sets(9, 3).rays
-    left, errors = without(gap, weight, basis, sets)
-    for ray, size in nonempty(enumerate(found.size)):
-        best = min((value, row) for row, value in enumerate(left) if ray in sets[row])[1]
-        assert size == pytest.approx(errors[best, sets[best].tolist().index(ray)], rel=1e-9)
-
-
-def test_a_point_that_holds_its_photos_alone_tests_nothing() -> None:
-    """The photos take all of its misclosures: what is left of their weight is a billionth."""
-    point = a_point(6, 2)
-    basis = np.linalg.qr(point.by_point, mode="complete")[0][:, 3:]
-    held = replace(point, of_photos=basis @ basis.T, inside=np.ones(4, bool))
-    assert point_decisions._misclosures(held).weight[0, 0] == pytest.approx(1e-9, rel=0.01)
-    assert not decide(held, limit()).out.any()

@@ -63,11 +63,6 @@ def scatter(elements: Floats, pairs: Pairs) -> float:
     return float(np.sqrt(points.var(axis=0).sum(axis=1).mean()))
 
 
-@pytest.mark.parametrize("kappa", [0.0, 2.0])
-def test_a_pair_of_six_standard_points_is_a_good_one(kappa: float) -> None:
-    assert of(*band(BASE, kappa)) == pytest.approx(1.0, abs=1e-9)
-
-
 @pytest.mark.parametrize(("spread", "kappa"), [(BASE / 8, 0.0), (BASE / 3, 2.0), (1.3 * BASE, 1.0)])
 def test_points_scatter_as_many_times_as_in_a_good_pair(spread: float, kappa: float) -> None:
     """Pairs measured anew, their points intersected with their own elements and with those of good pairs."""
