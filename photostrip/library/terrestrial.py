@@ -25,9 +25,7 @@ class Computed(NamedTuple):
     notes: Sequence[Note]
 
 
-def terrestrial(
-    kind: TerrestrialKind, path: Path | None, assignments: Sequence[str], *, fine: bool = False
-) -> Computed:
+def terrestrial(kind: TerrestrialKind, path: Path | None, assignments: Sequence[str]) -> Computed:
     """Compute what a file asks for, or the keys that are set alone."""
     from photostrip.project.terrestrial import directions as keys
     from photostrip.project.terrestrial.cameras import known_presets, only_camera
