@@ -47,6 +47,7 @@ LITTLE = 0.1  # of a principal distance: another certificate, or focus
 NEAR, STEPS = 1e-4, 20  # of a principal distance, within which it is found, and trials for it
 LEAST_FULL = 3  # full points that always fit
 LEAST_HEIGHTS = 2  # that are the same by chance
+ALIKE = 1e-6  # of the logarithm of a likelihood: rounding, where a similarity turns one reading into the other
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def find_reading(
         if tried is None or not tried.fits:
             continue
         cost = _cost(tried, way, unknowns, number)
-        if cost < least:
+        if cost < least - ALIKE:
             best, least = Better(reading=way, number=number, laid=tried), cost
     return best
 
