@@ -7,3 +7,11 @@ turned, ``monitoring`` walks through all of it to a time series. ``one_station``
 known distances; ``forecast`` says beforehand how well displacements will be known. ``frame`` holds the geometry: how a
 camera looks at the ground.
 """
+
+from __future__ import annotations
+
+from typing import Literal
+
+TerrestrialKind = Literal[
+    "directions", "photo", "accuracy", "theodolite", "orientation", "displacement", "one-station", "cameras"
+]

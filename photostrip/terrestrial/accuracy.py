@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,14 @@ from photostrip.terrestrial.frame import ground_from_photo, partials
 from photostrip.units import ARCSECONDS
 
 LEVEL_CAMERA = 1e-12  # difference of a rotation from that of a level camera
+
+
+class Theodolite(NamedTuple):
+    """Standard deviations of directions measured in one round, in arcseconds, and the number of rounds."""
+
+    horizontal: float
+    vertical: float
+    rounds: int
 
 
 @dataclass(frozen=True, eq=False)
