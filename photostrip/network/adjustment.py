@@ -341,6 +341,17 @@ class Selection:
         """Which given coordinates take part."""
         return b"".join(each.tobytes() for each in (self.control, self.positions, self.attitudes))
 
+    def given_out(self, problem: BundleProblem) -> int:
+        """Count the given coordinates that take no part, of control where it is seen."""
+        shown = np.isin(problem.control.point, problem.images.point[self.images])[:, None]
+        every = Selection.everything(problem)
+        parts = (
+            (every.control & shown, self.control),
+            (every.positions, self.positions),
+            (every.attitudes, self.attitudes),
+        )
+        return sum(int((given & ~used).sum()) for given, used in parts)
+
     def without(self, kind: str, row: int, axis: int) -> Selection:
         flags = getattr(self, FIELDS[kind]).copy()
         flags[row if kind == "image" else (row, axis)] = False

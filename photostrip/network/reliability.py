@@ -164,12 +164,21 @@ class Limit(NamedTuple):
 
     value: float  # largest standardised residual of a coordinate
     both: float  # the same of a point on two photos, which loses both rays
-    alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
+    given: float  # the same of a given coordinate, of which wrong rays say nothing
+    alpha: float  # probability that the test of one good coordinate of a ray, or of rays that agree, rejects them
+    alpha_of_given: float  # that of one good given coordinate does
     unit: float  # standard deviation of unit weight in force
 
     def of(self, rays: Numbers | int) -> Floats:
         """Largest standardised residual by number of rays of the point."""
         return np.where(rays == 2, self.both, self.value)
+
+    def shifts(self, power: float) -> dict[str, float]:
+        """Give ``noncentrality`` for each kind of observation."""
+        return {
+            kind: noncentrality(self.alpha if kind == IMAGE else self.alpha_of_given, power)
+            for kind in (IMAGE, CONTROL, POSITION, ATTITUDE)
+        }
 
 
 def tests_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> int:
@@ -178,22 +187,30 @@ def tests_of(problem: BundleProblem, solution: BundleSolution, precision: Cofact
 
 
 def limit_of(
-    solution: BundleSolution, settings: BundleSettings, tests: int, established: int, share_of_both: float = 1.0
+    solution: BundleSolution,
+    settings: BundleSettings,
+    tests: int,
+    established: tuple[int, int],
+    share_of_both: float = 1.0,
 ) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow.
 
     Without errors all tests together have the level q of the settings. With many errors q is the part of the rejections
     that are false: with k of m hypotheses rejected the next is tested at i q / (m + 1 - i (1 - q)), i = k + 1, and
-    m - k tests are left. Source: [Gavrilov 2009].
+    m - k tests are left. Source: [Gavrilov 2009]. Rays and given coordinates are counted apart: that many rays are
+    wrong says nothing of control.
 
+    established: rejections of points, by their rays, and of given coordinates.
     share_of_both: what the test of a point on two photos has of the level of one test.
     """
     found = settings.test == "tau" and sigma0_test(solution).too_large
-    share = settings.level * (established + 1)
-    alpha = share / (max(tests, 1) + share) if settings.alpha is None else settings.alpha
+    shares = (settings.level * (rejected + 1) for rejected in established)
+    alpha, of_given = (
+        share / (max(tests, 1) + share) if settings.alpha is None else settings.alpha for share in shares
+    )
     test, unit = ("tau", solution.sigma0) if found else ("baarda", 1.0)
-    value, both = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both))
-    return Limit(value=value, both=both, alpha=alpha, unit=unit)
+    value, both, given = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both, of_given))
+    return Limit(value=value, both=both, given=given, alpha=alpha, alpha_of_given=of_given, unit=unit)
 
 
 LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it

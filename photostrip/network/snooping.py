@@ -80,12 +80,13 @@ class ScreenedBundle:
         precision = cofactors_of(solution)
         tests = reliability.tests_of(chosen, solution, precision)
         points_out = len(np.unique(problem.images.point[~selection.images]))
+        established = points_out, selection.given_out(problem)
         return cls(
             problem=chosen,
             selection=selection,
             solution=solution,
             precision=precision,
-            limit=reliability.limit_of(solution, settings, tests, points_out, BOTH_GO if rough else 1.0),
+            limit=reliability.limit_of(solution, settings, tests, established, BOTH_GO if rough else 1.0),
         )
 
     @cached_property
@@ -569,10 +570,10 @@ class _Search:
                     axes=(axis,),
                     test=self.settings.test,
                     value=float(value[row, axis]),
-                    limit=limit.value,
+                    limit=limit.given,
                     size=tuple(group.gross[row].tolist()),
                 )
-                for row, axis in np.argwhere(value > limit.value).tolist()
+                for row, axis in np.argwhere(value > limit.given).tolist()
             ]
         return rays, sorted(given, key=lambda each: -each.value)
 
@@ -620,11 +621,11 @@ class _Search:
             cause=decided.cause[out],
         )
 
-    def _decided(self, done: ScreenedBundle, rows: Numbers, xyz: Floats) -> RayDecisions:
+    def _decided(self, done: ScreenedBundle, rows: Numbers, xyz: Floats, control: Flags | None = None) -> RayDecisions:
         adjusted = Adjusted(
             problem=self.problem,
             selection=done.selection,
-            control=self.control,
+            control=self.control if control is None else control,
             solution=done.solution,
             joint=done.joint,
         )
@@ -656,7 +657,9 @@ class _Search:
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] >= self.problem.least
         place = np.where(placed, done.solution.points[numbers], np.nan)
         place = np.where(rays[numbers, None] < self.problem.least, xyz[numbers], place)
-        decided = self._decided(done, self.rays_of(numbers), place)
+        owner = self.problem.control.point
+        unseen = self.waiting & ~np.isin(owner, point[images])[:, None]  # only rays that are out contradict it
+        decided = self._decided(done, self.rays_of(numbers), place, self.control | unseen)
         self.rays.say(self._rejected(decided, limit))
         row, number = decided.row, numbers[decided.place]
         self.beyond[number] = decided.value / limit.unit
@@ -666,7 +669,8 @@ class _Search:
         xyz[numbers[fit]] = place[fit]
         again = fit[decided.place]
         images[row[again]] = (~decided.out | (images[row] & self.spared[number]))[again]
-        fits = self._given(done, limit.value * limit.unit)
+        fits = self._given(done, limit.given * limit.unit)
+        fits |= unseen & np.isin(owner, numbers[fit])[:, None]
         self.control, self.waiting = self.control | fits, self.waiting & ~fits
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
         chosen = supported(self.problem, replace(left, images=images, control=self.control))
@@ -695,5 +699,5 @@ class _Search:
             found = each
             if np.isnan(each.value):
                 size = tuple((-done.solution.control_residuals[row]).tolist())
-                found = replace(each, limit=done.limit.value, size=size)
+                found = replace(each, limit=done.limit.given, size=size)
             yield replace(found, readmitted=holds(kind, row, axis))

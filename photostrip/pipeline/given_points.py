@@ -116,7 +116,7 @@ def unchecked_control_notes(adjusted: AdjustedStrips, power: float) -> Iterator[
 
 def _of_bundle(bundle: Bundle, power: float) -> Iterator[Note]:
     problem, screened = bundle.screened.problem, bundle.screened
-    shift = reliability.noncentrality(screened.limit.alpha, power)
+    shift = screened.limit.shifts(power)[reliability.CONTROL]
     for group in bundle.groups:
         if group.kind == reliability.CONTROL:
             ids = [problem.point_name(number) for number in problem.control.point.tolist()]

@@ -23,6 +23,19 @@ KINDS = {  # where the keys of each kind of file stand, and its title
     "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),
     "displacement": ("plans.displacement", "DisplacementPlanFile", "photostrip plan displacement"),
     "screening": ("plans.screening", "ScreeningPlanFile", "photostrip plan screening"),
+    "terrestrial displacement": ("terrestrial.survey_file", "TerrestrialFile", "photostrip terrestrial displacement"),
+    **{
+        f"terrestrial {kind}": ("terrestrial.directions", name, f"photostrip terrestrial {kind}")
+        for kind, name in {
+            "directions": "DirectionsFile",
+            "photo": "PhotoFile",
+            "accuracy": "AccuracyFile",
+            "theodolite": "TheodoliteFile",
+            "orientation": "OrientationFile",
+            "one-station": "OneStationFile",
+            "cameras": "CamerasFile",
+        }.items()
+    },
 }
 MEASURED = {  # in a project
     "allOf": [

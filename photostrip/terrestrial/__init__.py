@@ -6,3 +6,11 @@ with their tests: ``normal_case`` holds the geometry, brings two photos of any o
 compares two epochs, ``camera_motion`` finds cameras that turned, also with photos of one station, ``monitoring`` walks
 through all of it to a time series.
 """
+
+from __future__ import annotations
+
+from typing import Literal
+
+TerrestrialKind = Literal[
+    "directions", "photo", "accuracy", "theodolite", "orientation", "displacement", "one-station", "cameras"
+]

@@ -29,6 +29,14 @@ from photostrip.units import ARCSECONDS
 LEVEL_CAMERA = 1e-12  # difference of a rotation from that of a level camera
 
 
+class Theodolite(NamedTuple):
+    """Standard deviations of directions measured in one round, in arcseconds, and the number of rounds."""
+
+    horizontal: float
+    vertical: float
+    rounds: int
+
+
 @dataclass(frozen=True, eq=False)
 class RequiredAccuracy:
     """Standard deviations with which correction directions must be known."""

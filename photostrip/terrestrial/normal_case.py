@@ -36,6 +36,7 @@ from photostrip.statistics import chi2_quantile
 GROUND_FROM_HOUSE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # what small turns of a camera in its own axes are as a vector: (alpha, omega, kappa) -> (omega, -alpha, kappa)
 TURN_AXES = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and roll are one
 BEHIND = 1e-6  # cosine of the angle to the optical axis below which a direction cannot be on the photo
 
 
@@ -111,6 +112,14 @@ class Phototheodolite:
     principal_distance: float  # principal distance f in mm
     principal_point: tuple[float, float] = (0.0, 0.0)  # x0, z0 in mm in the system of the image coordinates
     format: tuple[float, float] | None = None  # width and height in mm of the field in which points are measured
+
+
+class Attitude(NamedTuple):
+    """How a camera looks."""
+
+    angles: tuple[float, float, float]  # alpha, omega, kappa, radians
+    rotation: Floats  # (3, 3): photo to ground
+    unit: str  # in which angles and directions are reported: ``"deg"`` or ``"gon"``
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ KINDS = {  # of files, by the key that holds the number of their schema
     "photostrip_plan_cameras": "a plan for `photostrip plan camera`",
     "photostrip_plan_displacement": "a plan for `photostrip plan displacement`",
     "photostrip_plan_screening": "a plan for `photostrip plan screening`",
-    "photostrip_terrestrial": "a project for `photostrip terrestrial displacement`",
+    "photostrip_terrestrial": "a file for `photostrip terrestrial`",
     "photostrip_cameras": "a list of cameras for `photostrip terrestrial`",
     "photostrip_tolerances": "a tolerance profile for `photostrip compare --tol`",
     "photostrip_result": "a result for `photostrip report` and `photostrip compare`",

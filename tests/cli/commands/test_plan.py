@@ -432,7 +432,7 @@ def test_displacements_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[s
     file = tmp_path / "d.yaml"
     file.write_text(
         "photostrip_plan_displacement: 1\nbase: 30\ndistances: [50, 120]\nsigma_d_um: 5.656854249492381\n"
-        "principal_distance: 100\nformat: [160, 120]\n"
+        "camera: UMK 10/1318\n"
     )
     assert answer(capsys, "plan", "displacement", str(file), "--format", "json") == from_options
     document = json.loads(from_options)

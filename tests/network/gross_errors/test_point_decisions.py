@@ -30,7 +30,8 @@ SEEDS = st.integers(0, 2**31)
 
 
 def limit(alpha: float = ALPHA) -> Limit:
-    return Limit(normal_quantile(1 - alpha / 2), normal_quantile(1 - alpha / 4), alpha, 1.0)
+    value, both = (normal_quantile(1 - level / 2) for level in (alpha, alpha / 2))
+    return Limit(value=value, both=both, given=value, alpha=alpha, alpha_of_given=alpha, unit=1.0)
 
 
 def a_point(seed: int, rays: int = 3) -> PointRays:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from photostrip.formats.output.terrestrial_displacements import _camera
+from photostrip.sheets.displacements import camera_row
 
 if TYPE_CHECKING:
     from photostrip.terrestrial.monitoring import CameraState, Monitoring
@@ -18,5 +18,5 @@ def test_stable_points_that_lost_all_weight_are_not_counted() -> None:
     turn = SimpleNamespace(values=np.zeros(3), sigma=np.ones(3), weights=weights, dof=3, statistic=1.0)
     state = SimpleNamespace(epoch=0, side="left", turn=turn, moved=False, removed=False)
     result = SimpleNamespace(series=SimpleNamespace(epochs=("1",)), settings=SimpleNamespace(significance=0.05))
-    row = _camera(cast("Monitoring", result), cast("CameraState", state))
-    assert (row["determined"], row["stable_points"], row["redundancy"]) == (True, 3, 3)
+    row = camera_row(cast("Monitoring", result), cast("CameraState", state))
+    assert row[8:10] == (3, 3)  # stable points, redundancy
