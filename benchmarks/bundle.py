@@ -26,16 +26,16 @@ import numpy as np  # noqa: E402
 
 from benchmarks import peers  # noqa: E402
 from benchmarks.accuracy import table  # noqa: E402
+from photostrip.network.adjustment import solve  # noqa: E402
 from photostrip.network.cofactors import cofactors_of  # noqa: E402
-from photostrip.network.solve import solve  # noqa: E402
 from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 from tests.simulated_bundle import problem_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from photostrip.network.adjustment import BundleSolution, Cofactors
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution, Cofactors
 
 LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}
 EXTRA = {False: 0.41, True: 0.256}  # points of a model for each point of a photo, in a strip and in a block
@@ -183,9 +183,6 @@ def _print_ratios(ratios: Sequence[tuple[Case, Times]]) -> None:
     )
     print("COLMAP; our covariances of all points and photos to our solution")
     table(("photos", "to Ceres", "to its solver", "to COLMAP", "covariances", "within"), lines)
-
-
-# --------------------------------------------------------------------------------------------- growth
 
 
 def main() -> None:

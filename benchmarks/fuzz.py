@@ -39,7 +39,7 @@ def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
     with tempfile.TemporaryDirectory() as place:
         right = (blocks if of_blocks else projects)(Path(place) / "right")
         for each in range(number):
-            random = Random(f"{seed} {each}")  # noqa: S311 (no secret: the same cases every time)
+            random = Random(f"{seed} {each}")  # noqa: S311 (the same cases every time)
             case, command = damaged(right, random), random.choice(["run", "check"])
             outcome = tried(case, emptied(Path(place) / "case"), command)
             codes[command, outcome.code] += 1

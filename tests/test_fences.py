@@ -23,7 +23,6 @@ FENCES = {
     "jinja2": ("report/*",),
     "json": FILES,
     "laspy": ("foreign/historix_submission.py",),
-    "matplotlib": ("report/*",),
     "pydantic": ("project/*",),
     "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
     "rich": ("report/page/console.py", "report/page/progress.py"),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Form = Literal["text", "md", "json", "csv"]
 FORMS = {".json": "json", ".csv": "csv", ".md": "md", ".txt": "text", ".html": "html"}  # by the ending of a file
-PICTURES = (".svg", ".png")
+PICTURE = ".svg"
 
 Printed = Annotated[Form, typer.Option("--format", help="How the answer is printed.")]
 Assigned = Annotated[
@@ -36,17 +36,14 @@ Written = Annotated[
 ]
 
 
-def check_target(output: Path | None, depfile: Path | None = None, *, pictures: bool = False) -> bool:
+def check_target(output: Path | None, depfile: Path | None = None, *, picture: bool = False) -> bool:
     """Refuse what cannot be written before anything is computed; return whether a picture is wanted."""
     require_target(depfile, output)
     if output is None or output.suffix.lower() in FORMS:
         return False
-    if pictures and output.suffix.lower() in PICTURES:
-        from photostrip.report.pictures.plans import check_picture
-
-        check_picture(output)
+    if picture and output.suffix.lower() == PICTURE:
         return True
-    known = ", ".join([*FORMS, *(PICTURES if pictures else ())])
+    known = ", ".join([*FORMS, PICTURE] if picture else FORMS)
     raise typer.BadParameter(f"nothing is written as '{output.suffix}': the name may end in {known}", param_hint="-o")
 
 

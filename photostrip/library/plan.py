@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,8 +14,6 @@ from photostrip.planning import PlanKind
 
 if TYPE_CHECKING:
     from photostrip.sheets.sheet import Sheet
-
-FINE = 41  # points along and across of the picture of a model
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,21 +58,19 @@ def plan(
     return planned(kind, None if specification is None else Path(specification), assignments)
 
 
-def planned(kind: str, path: Path | None, assignments: Sequence[str], *, fine: bool = False) -> Plan:
-    """Read a plan from its file, or from assignments to its keys alone, and compute it; a model on a `fine` grid."""
+def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
+    """Read a plan from its file, or from assignments to its keys alone, and compute it."""
     match kind:
         case "model":
-            from photostrip.planning.model.plan import both_forms, given_errors, plan_model
+            from photostrip.planning.model_plan import both_forms, given_errors, plan_model
             from photostrip.project.plans.model import load_model_plan
             from photostrip.sheets.model_plan import model_sheet
 
             model = load_model_plan(path, assignments)
-            spec = replace(model.spec, grid=(FINE, FINE)) if fine else model.spec
-            forms, printed = None if model.closed_form == "no" else both_forms(spec), model.closed_form == "printed"
-            errors = given_errors(spec)
-            return Plan(
-                model_sheet(model.name, model.camera, plan_model(spec), errors, forms, printed=printed), model.files
-            )
+            spec, printed = model.spec, model.closed_form == "printed"
+            forms = None if model.closed_form == "no" else both_forms(spec)
+            forecast, errors = plan_model(spec), given_errors(spec)
+            return Plan(model_sheet(model.name, model.camera, forecast, errors, forms, printed=printed), model.files)
         case "strip":
             from photostrip.project.plans.strip import load_strip_plan
             from photostrip.sheets.strip_plan import strip_sheet

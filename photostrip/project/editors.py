@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_origin
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from photostrip.project.schema.sections import Section
-from photostrip.project.schema.values import AUTO
+from photostrip.project.schema.sections import AUTO, Section, bare, is_section
 
 if TYPE_CHECKING:
     from pydantic_core import core_schema
@@ -16,12 +16,25 @@ if TYPE_CHECKING:
 KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
-    "tolerances": ("profiles.tolerances", "ToleranceFile", "photostrip tolerance profile"),
+    "tolerances": ("tolerances", "ToleranceFile", "photostrip tolerance profile"),
     "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
     "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
     "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),
     "displacement": ("plans.displacement", "DisplacementPlanFile", "photostrip plan displacement"),
     "screening": ("plans.screening", "ScreeningPlanFile", "photostrip plan screening"),
+    "terrestrial displacement": ("terrestrial.survey_file", "TerrestrialFile", "photostrip terrestrial displacement"),
+    **{
+        f"terrestrial {kind}": ("terrestrial.directions", name, f"photostrip terrestrial {kind}")
+        for kind, name in {
+            "directions": "DirectionsFile",
+            "photo": "PhotoFile",
+            "accuracy": "AccuracyFile",
+            "theodolite": "TheodoliteFile",
+            "orientation": "OrientationFile",
+            "one-station": "OneStationFile",
+            "cameras": "CamerasFile",
+        }.items()
+    },
 }
 MEASURED = {  # in a project
     "allOf": [
@@ -57,3 +70,15 @@ class _ForEditors(GenerateJsonSchema):
         if default is None:
             return {**found, "default": "auto"} if AUTO in found.get("anyOf", ()) else found
         return {**found, "default": {} if isinstance(default, Section) else default}
+
+
+def single_keys(kind: type[Section] | None = None, above: str = "") -> Iterator[str]:
+    """Return the paths of all single values of a project file; below lists and names of users there are none."""
+    from photostrip.project.schema.project_file import ProjectFile
+
+    for name, field in (kind or ProjectFile).model_fields.items():
+        inner = bare(field.annotation)
+        if is_section(inner):
+            yield from single_keys(inner, f"{above}{name}.")
+        elif get_origin(inner) not in {list, dict, tuple}:
+            yield f"{above}{name}"

@@ -16,7 +16,7 @@ def info(
         Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed: text or json.")
     ] = Format.TEXT,
 ) -> None:
-    """Print versions, threads, formats and extras, and how to get what is missing.
+    """Print versions and formats, and how to get what is missing.
 
     Include it in every report of a problem.
     """
@@ -32,7 +32,7 @@ def info(
 
 
 def sources(form: Printed = "text") -> None:
-    """Compute every worked number of the sources again, beside what is printed.
+    """Compute every worked number of the sources again.
 
     Lists every misprint, and the command and the function for every equation.
     """

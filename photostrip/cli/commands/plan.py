@@ -38,13 +38,12 @@ def plan(
     with failures_as(form):
         from photostrip.library.plan import planned
 
-        picture = check_target(output, depfile, pictures=True)
+        picture = check_target(output, depfile, picture=kind == "strip")
         found = planned(kind, file, assignments or [])
         if picture and output is not None:
             from photostrip.formats.text.writing import write_text
-            from photostrip.report.pictures.plans import plan_picture
+            from photostrip.report.pictures.plan_strip import strip_plan_picture
 
-            drawn = planned(kind, file, assignments or [], fine=True) if kind == "model" else found
-            write_text(output, plan_picture(drawn.document, output.suffix))
+            write_text(output, strip_plan_picture(found.document).file())
         deliver(found.sheet, form, output, quiet=quiet)
         write_rule(depfile, output, found.files)

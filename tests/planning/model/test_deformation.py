@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import (
+from photostrip.planning.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,
@@ -21,7 +21,7 @@ from photostrip.planning.model.deformation import (
     rigorous_covariance,
     surface_of_elements,
 )
-from photostrip.planning.model.plan import source_example
+from photostrip.planning.model_plan import source_example
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import ground_errors, orientation_factors
 from tests.vectors import cases

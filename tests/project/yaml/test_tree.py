@@ -6,11 +6,10 @@ import pytest
 import yaml
 
 from photostrip.formats.text.findings import Findings
-from photostrip.project.yaml import parsing
-from photostrip.project.yaml.parsing import parse
-from photostrip.project.yaml.tree import Node, Place, fault_at, key_path
+from photostrip.project.yaml import tree
+from photostrip.project.yaml.tree import Node, Place, fault_at, key_path, parse
 
-LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(parsing.LOADER, id="c")]
+LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(tree.LOADER, id="c")]
 TEXT = """\
 # a comment
 ключ: Значение
@@ -26,7 +25,7 @@ after: {x: 🛩️, y: yes}
 
 @pytest.fixture(params=LOADERS)
 def _loader(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parsing, "LOADER", request.param)
+    monkeypatch.setattr(tree, "LOADER", request.param)
 
 
 def read(text: str) -> tuple[Node | None, Findings]:
@@ -92,12 +91,14 @@ def test_keys_know_their_place() -> None:
         ("- a\nb: 1", 2, "does not fit"),
         (" a: 1\nb: 2", 2, "does not fit"),
         ("a: *b", 1, "alias *b stands for nothing"),
-        ("a: &b\n  c: *b", 2, "alias *b stands for something it is part of"),
+        ("a: &b\n  c: *b", 1, "stands for the value itself"),
         ("<<: a", 1, "merge"),
         ("a: 1\na: 2", 2, "second time"),
         ("a: 1\n' a ': 2", 2, "second time"),
         ("a: 1\n...\n---\nb: 1", 3, "second document"),
-        ("a: {b: {c: [" + "[" * 30, 1, "nested"),
+        ("a: {b: {c: [" + "[" * 30 + "]" * 31 + "}}", 1, "nested"),
+        ("a: " + "[" * 2000 + "]" * 2000, 1, "nested"),
+        ("a: &x 1\nb: &x 2", 2, "the same &"),
         ("a: \x01", 1, "U+0001"),
         ("a: \ufffe", 1, "U+FFFE"),
     ],
@@ -157,12 +158,12 @@ def test_a_bracket_at_the_end_of_the_text_is_told_with_its_column() -> None:
 
 
 def test_an_alias_is_what_its_anchor_names() -> None:
-    root, findings = read("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos, e: &photos 7, f: *photos}")
+    root, findings = read("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos}")
     assert not findings.faults
     assert root is not None
     shared = ["x", {"k": "v"}]
-    assert root.plain == {"a": shared, "b": shared, "c": {"d": shared, "e": "7", "f": "7"}}
-    assert root.place_of(("b",)).line == 2  # where it is used
+    assert root.plain == {"a": shared, "b": shared, "c": {"d": shared}}
+    assert root.place_of(("b",)).line == 1  # where it would be put right
 
 
 def test_a_project_that_a_script_dumped_is_read() -> None:

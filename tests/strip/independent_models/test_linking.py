@@ -17,7 +17,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models, models_of
 from photostrip.strip.independent_models import linking
-from photostrip.strip.independent_models.settings import LinkSettings
+from photostrip.strip.independent_models.linking import LinkSettings
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
