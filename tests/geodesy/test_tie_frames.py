@@ -13,7 +13,7 @@ import pytest
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
-from tests.geodesy.frames import NEU, frame, pair, refused, spec, write_gtx
+from tests.geodesy.frames import frame, pair, refused, spec, write_gtx
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -82,21 +82,6 @@ def test_seven_parameters_there_and_back(towgs84: tuple[float, ...]) -> None:
     assert np.abs(xyz - expected).max() < 1e-5
     assert np.abs(given.ground_from_cartesian(xyz) - PULKOVO).max() < MICROMETRE
     assert output.geodetic(xyz)[0, 0] == pytest.approx(math.radians(25.4), abs=0.01)
-
-
-def test_a_shift_that_proj_knows_is_told_with_its_accuracy() -> None:
-    given, output = pair(spec("EPSG:28405", axes=NEU), "EPSG:32635")
-    assert given.describe().endswith("; datum shift: chosen by PROJ at the first point")
-    points = np.array([[5370000.0, 4710000.0, 550.0]])
-    given.cartesian_from_ground(points)
-    assert given.datum_shift.startswith("Pulkovo 1942 to WGS 84 (")
-    assert given.datum_accuracy is not None
-    assert 1.0 <= given.datum_accuracy <= 10.0
-    assert given.describe().endswith(f"; datum shift: {given.datum_shift}")
-    assert given.datum_shift.endswith(f"accuracy {given.datum_accuracy:g} m")
-    assert output.describe() == (
-        "EPSG:32635 (WGS 84 / UTM zone 35N): east, north, up; plan in metres, ellipsoidal heights in metres"
-    )
 
 
 @pytest.mark.slow
@@ -476,19 +461,6 @@ def run(program: str, **environment: str) -> str:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=os.environ | environment
     )
     return done.stdout.strip()
-
-
-def test_local_and_geocentric_frames_do_without_pyproj() -> None:
-    program = """
-import sys
-from photostrip.geodesy.frame_spec import FrameSpec
-from photostrip.geodesy.tying import tie_frames
-tie_frames([FrameSpec("local", ("east", "north", "up"))])
-frames, _ = tie_frames([FrameSpec("geocentric", ("x", "y", "z")), FrameSpec("geocentric", ("z", "x", "y"))])
-frames[0].geodetic([[4e6, 2e6, 4.5e6]])
-print("pyproj" in sys.modules)
-"""
-    assert run(program) == "False"
 
 
 @pytest.mark.slow

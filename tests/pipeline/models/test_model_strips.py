@@ -83,18 +83,6 @@ def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordin
     assert strip.wrong_control[0].size[2] == pytest.approx(5.0, abs=1.0)
 
 
-def test_entries_that_name_nothing_are_refused() -> None:
-    given = truth(3)
-    lists = LinkSettings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
-    with pytest.raises(InputError) as told:
-        triangulate(inputs(given, given.measured()), Settings(links=lists))
-    assert [(fault.key, fault.message.split("`")[1]) for fault in told.value.faults] == [
-        ("processing.links.keep", "M9/P001"),
-        ("processing.links.drop", "M2/104"),
-        ("processing.links.drop", "M1/P001"),
-    ]
-
-
 # ---------------------------------------------------------------------------------------------------- precision
 
 

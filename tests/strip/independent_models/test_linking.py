@@ -100,18 +100,6 @@ def test_a_gross_error_is_named_and_left_out(kind: str, size: float) -> None:
         assert 0.02 < np.sqrt((off**2).mean()) < 0.5  # metres; 0.4 mm are 3.6 m at 1:9000
 
 
-@pytest.mark.slow
-def test_good_points_are_rejected_as_rarely_as_stated() -> None:
-    gone = links = 0
-    for seed in range(40):
-        true = truth(10, 4, seed)
-        formed = formed_of(true.measured(np.random.default_rng(seed).normal(size=(len(true.model), 3))))
-        gone += len({int(formed.links.shared.link[each.row]) for each in formed.links.rejections})
-        links += formed.links.shared.count
-    assert links == 360
-    assert gone <= 11  # 3.6 are expected at the level of 0.01; more than 11 have a probability of 0.001
-
-
 def without(measured: ModelPoints, rows: NDArray[np.bool_]) -> ModelPoints:
     keep = ~rows
     return replace(
