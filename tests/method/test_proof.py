@@ -134,9 +134,6 @@ def assert_exact(found: Recovery) -> None:
 # ------------------------------------------------------------------------------------------------ free of errors
 
 
-MOON = "+proj=longlat +a=1737400 +b=1737400 +no_defs"
-
-
 @pytest.mark.parametrize(
     ("ground", "control"),
     [

@@ -85,17 +85,6 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
 
 
 @pytest.mark.slow
-def test_one_strip_of_several_is_named_alone() -> None:
-    """Only the second strip is off."""
-    shift = np.repeat([[0.0] * 3, [4.0, 4.0, 0.0]], 10, axis=0)
-    _, result = adjusted(shift=shift)
-    (finding,) = result.findings
-    assert finding.code == "P208"
-    assert "of strip B " in finding.message
-    assert set(finding.photos) == set(result.inputs.strips[1].photos)
-
-
-@pytest.mark.slow
 def test_a_drift_of_the_positions_is_named() -> None:
     """Half a metre from photo to photo."""
     _, result = adjusted(strips=1, shift=np.arange(10)[:, None] * np.array([0.5, 0.0, 0.2]))
