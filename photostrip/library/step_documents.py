@@ -14,9 +14,9 @@ from photostrip.geometry.rotation import angles
 from photostrip.library.step_arguments import sigma0_of
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
 from photostrip.notes import Document
+from photostrip.strip.intersection import Intersection
 from photostrip.strip.relative_orientation.solution import ELEMENTS
 from photostrip.strip.resection import OrientedPhoto
-from photostrip.strip.strip_formation.intersection import Intersection
 from photostrip.units import MICROMETRES
 
 Column = tuple[str, str, int, ArrayLike]  # name, unit, decimals; negative: digits of numbers of any size

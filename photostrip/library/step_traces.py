@@ -15,11 +15,11 @@ from photostrip.library.step_documents import Column, columns, table
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip, one_pair
 from photostrip.notes import Document
 from photostrip.result.trace.replay import first_rounds
-from photostrip.strip.image_coordinates.corrections import Bending, undistort
+from photostrip.strip.corrections import Bending, undistort
+from photostrip.strip.intersection import lies_across
 from photostrip.strip.polynomial_terms import columns as design_columns
 from photostrip.strip.relative_orientation.solution import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, OrientedPhoto, approximate, project, resect
-from photostrip.strip.strip_formation.intersection import lies_across
 from photostrip.units import MICROMETRES
 
 Trace = list[Document]

@@ -18,9 +18,9 @@ from photostrip.result.records import as_records
 from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.strip import absolute_orientation
+from photostrip.strip.formed_strip import FirstPhoto, base_angles, intersect_models
 from photostrip.strip.polynomial_terms import POWERS
 from photostrip.strip.relative_orientation.solution import ELEMENTS
-from photostrip.strip.strip_formation.strip import FirstPhoto, base_angles, intersect_models
 
 SCHEMA = 1
 ANGLE, CHANGE, SQUARES, IMAGE, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares
