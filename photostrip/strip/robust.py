@@ -6,8 +6,9 @@ agree. It is a start: what the tests then find wrong is left out, and the rest a
 Source: the weights of [Krarup 1980]; the scale is the median absolute deviation [Hampel 1974].
 
 Relative orientation with these weights on y parallaxes is not pulled away by a fifth of wrong points. Where more points
-disagree than a search can explain, it starts from the best of many sets of five points [Rousseeuw 1984]. Best is the least sum of log(1 + e) over the residuals e: the median
-of the source knows half of them, and a single far point that turns a pair makes half of the others fit by chance.
+disagree than a search can explain, it starts from the best of many sets of five points [Rousseeuw 1984]. Best is the
+least sum of log(1 + e) over the residuals e: the median of the source knows half of them, and a single far point that
+turns a pair makes half of the others fit by chance.
 """
 
 from __future__ import annotations
