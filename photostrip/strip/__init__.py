@@ -5,3 +5,21 @@ its models; ``absolute_orientation`` on the control; ``polynomial`` correction o
 photos. Beside them ``error_propagation``, ``gross_errors`` of pairs and of control, and ``independent_models``;
 ``robust`` has the weights that several of them use.
 """
+
+from __future__ import annotations
+
+from typing import Literal
+
+StepName = Literal[
+    "interior",
+    "refine",
+    "relative",
+    "intersection",
+    "chain",
+    "scale",
+    "strip",
+    "absolute",
+    "polynomial",
+    "resection",
+    "bundle",
+]  # that can be taken alone
