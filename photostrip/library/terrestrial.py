@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from photostrip.project.yaml.reading import Reading
     from photostrip.sheets.directions import Grid
     from photostrip.sheets.sheet import Sheet
-    from photostrip.terrestrial.frame import Phototheodolite
+    from photostrip.terrestrial.normal_case import Phototheodolite
 
 
 class Computed(NamedTuple):
@@ -106,7 +106,7 @@ def _one_station(path: Path | None, assignments: Sequence[str]) -> Computed:
     from photostrip.project.terrestrial.tables import read_one_station
     from photostrip.project.yaml.reading import read_keys
     from photostrip.sheets.displacements import one_station_sheet
-    from photostrip.terrestrial.one_station import one_station
+    from photostrip.terrestrial.camera_motion import one_station
 
     given, reading = read_keys(OneStationFile, path, assignments)
     camera, measured = only_camera(given.camera, reading), None

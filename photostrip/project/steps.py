@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from photostrip.project.schema.sections import After, Section, key
-from photostrip.project.schema.values import FirstSchema, Flag, Number, Pair, Positive, Triple, Words, one_of
-from photostrip.strip.polynomial.terms import POWERS
+from photostrip.project.schema.sections import (
+    After,
+    FirstSchema,
+    Flag,
+    Number,
+    Pair,
+    Positive,
+    Section,
+    Triple,
+    Words,
+    key,
+    one_of,
+)
+from photostrip.strip.polynomial_terms import POWERS
 
 
 class StepKeys(Section):

@@ -14,7 +14,7 @@ from photostrip.report.page.parts import DASH, Part, Words
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, by_columns, fields, plain, written
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.accuracy import Theodolite
-from photostrip.terrestrial.frame import Attitude, Phototheodolite, directions_from_photo, photo_from_directions
+from photostrip.terrestrial.normal_case import Attitude, Phototheodolite, directions_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
 from photostrip.units import ARCSECONDS, MICROMETRES
 

@@ -15,10 +15,9 @@ from photostrip.result.numbers import natural_rank
 from photostrip.sheets.directions import camera_facts
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, plain
 from photostrip.statistics import chi2_quantile
-from photostrip.terrestrial.frame import Attitude, Phototheodolite
+from photostrip.terrestrial.camera_motion import OneStation, OneStationResult
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
-from photostrip.terrestrial.normal_case import SIDES, ellipses
-from photostrip.terrestrial.one_station import OneStation, OneStationResult
+from photostrip.terrestrial.normal_case import SIDES, Attitude, Phototheodolite, ellipses
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 COVARIANCES = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}

@@ -13,8 +13,8 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.terrestrial import ranges
 from photostrip.terrestrial.accuracy import Theodolite
-from photostrip.terrestrial.frame import Phototheodolite
-from photostrip.terrestrial.one_station import OneStation
+from photostrip.terrestrial.camera_motion import OneStation
+from photostrip.terrestrial.normal_case import Phototheodolite
 from photostrip.terrestrial.orientation import Sightings
 from photostrip.units import ARCSECONDS
 

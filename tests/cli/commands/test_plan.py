@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.planning.model.plan import ModelSpec, control_layout, given_errors, plan_model
+from photostrip.planning.model_plan import ModelSpec, control_layout, given_errors, plan_model
 from photostrip.project.plans.model import load_model_plan
 from tests.loops import nonempty
 

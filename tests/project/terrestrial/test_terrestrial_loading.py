@@ -22,7 +22,7 @@ from tests.test_packaging import build
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from photostrip.terrestrial.frame import Phototheodolite
+    from photostrip.terrestrial.normal_case import Phototheodolite
 
 
 def read_presets(file: str) -> dict[str, Phototheodolite]:
