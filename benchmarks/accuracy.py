@@ -32,7 +32,7 @@ import numpy as np  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.strip.polynomial import correction, terms  # noqa: E402
+from photostrip.strip import polynomial, polynomial_terms  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def run(task: Task) -> Outcome:
     for choice in task.choices:
         degree = choice if choice in {"2", "3"} else AUTO
         by = choice if choice in {SIMILARITY, BUNDLE} else "polynomial"
-        chosen = replace(settings, adjustment=by, polynomial=correction.PolynomialSettings(degree), precision=False)
+        chosen = replace(settings, adjustment=by, polynomial=polynomial.PolynomialSettings(degree), precision=False)
         result = triangulate(inputs, chosen)
         squares[choice] = mean_squares(simulation, result, result.points.cartesian)
         degrees[choice] = _degrees(result)
@@ -147,7 +147,7 @@ def _degrees(result: Result) -> tuple[int, int]:
     found = result.strips[0].polynomial
     if found is None:
         return 0, 0
-    plan, _, height = ([terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    plan, _, height = ([polynomial_terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
     return max(plan, default=0), max(height, default=0)
 
 

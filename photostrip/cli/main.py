@@ -50,7 +50,7 @@ COMMANDS: dict[str, tuple[Command | typer.Typer, str]] = {
     "simulate": (simulate, "photostrip simulate strip.yaml -o simulated"),
     "plan": (plan, "photostrip plan model --set end_lap_percent=60 --set control.layout=corners"),
     "step": (step, "photostrip step relative pair.csv -f 153 --base 920 --unit m"),
-    "terrestrial": (terrestrial, "photostrip terrestrial displacement survey.yaml -o result"),
+    "terrestrial": (terrestrial, "photostrip terrestrial displacement survey.yaml -o survey.svg"),
     "sources": (sources, "photostrip sources --format md"),
     "schema": (schema, "photostrip schema -o photostrip.schema.json"),
     "info": (info, "photostrip info --format json"),

@@ -62,7 +62,7 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
     """Read a plan from its file, or from assignments to its keys alone, and compute it."""
     match kind:
         case "model":
-            from photostrip.planning.model.plan import both_forms, given_errors, plan_model
+            from photostrip.planning.model_plan import both_forms, given_errors, plan_model
             from photostrip.project.plans.model import load_model_plan
             from photostrip.sheets.model_plan import model_sheet
 

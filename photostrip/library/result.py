@@ -172,7 +172,7 @@ class Result:
         if self.computed is None:
             message = "a saved result holds no covariances between points"
             raise InputError(Fault(message, "result-saved", fix="run the project again"))
-        from photostrip.pipeline.precision.joint_points import joint_covariance
+        from photostrip.pipeline.precision import joint_covariance
 
         point_ids = self.computed.refined.observations.point_ids
         place = {point_ids[number]: row for row, number in enumerate(self.computed.points.number.tolist())}

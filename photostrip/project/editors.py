@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, get_origin
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from photostrip.project.schema.sections import Section, bare, is_section
-from photostrip.project.schema.values import AUTO
+from photostrip.project.schema.sections import AUTO, Section, bare, is_section
 
 if TYPE_CHECKING:
     from pydantic_core import core_schema
@@ -17,12 +16,25 @@ if TYPE_CHECKING:
 KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
-    "tolerances": ("profiles.tolerances", "ToleranceFile", "photostrip tolerance profile"),
+    "tolerances": ("tolerances", "ToleranceFile", "photostrip tolerance profile"),
     "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
     "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
     "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),
     "displacement": ("plans.displacement", "DisplacementPlanFile", "photostrip plan displacement"),
     "screening": ("plans.screening", "ScreeningPlanFile", "photostrip plan screening"),
+    "terrestrial displacement": ("terrestrial.survey_file", "TerrestrialFile", "photostrip terrestrial displacement"),
+    **{
+        f"terrestrial {kind}": ("terrestrial.directions", name, f"photostrip terrestrial {kind}")
+        for kind, name in {
+            "directions": "DirectionsFile",
+            "photo": "PhotoFile",
+            "accuracy": "AccuracyFile",
+            "theodolite": "TheodoliteFile",
+            "orientation": "OrientationFile",
+            "one-station": "OneStationFile",
+            "cameras": "CamerasFile",
+        }.items()
+    },
 }
 MEASURED = {  # in a project
     "allOf": [

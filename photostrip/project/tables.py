@@ -27,10 +27,9 @@ from photostrip.formats.text.numbers import number as read_number
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
-from photostrip.project.forms import form_of
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.schema.ground import Control
-from photostrip.project.yaml.reading import Reading
+from photostrip.project.yaml.reading import Reading, form_of
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
 from photostrip.project.yaml.tree import Node, fault_at
 
@@ -260,7 +259,7 @@ def in_one_zone(
     for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
         if not given.other_zone:
             continue
-        from photostrip.geodesy.zones import FEWEST_COMMON, join_zones  # few projects have two zones
+        from photostrip.geodesy.crs import FEWEST_COMMON, join_zones
 
         place = ("control", number, "other_zone")
         if number == 0:

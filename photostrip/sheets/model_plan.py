@@ -13,10 +13,10 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import counted
-from photostrip.planning.model.closed_form import ORDER
-from photostrip.planning.model.deformation import DEFORMATION_TERMS
-from photostrip.planning.model.plan import BothForms, Forecast, GivenErrors, ModelSpec, NamedPoint, simple_accuracy
-from photostrip.planning.model.single_model import ELEMENTS, FREE, PARAMETERS
+from photostrip.planning.closed_form import ORDER
+from photostrip.planning.deformation import DEFORMATION_TERMS
+from photostrip.planning.model_plan import BothForms, Forecast, GivenErrors, ModelSpec, NamedPoint, simple_accuracy
+from photostrip.planning.single_model import ELEMENTS, FREE, PARAMETERS
 from photostrip.result.numbers import rms
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, by_columns, fields, hidden, plain, with_unit
 from photostrip.units import ARCSECONDS, MICROMETRES

@@ -10,7 +10,7 @@ from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, b
 from photostrip.planning.screening import ARC_MINUTES, ScreeningOutcome
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden
 from photostrip.strip.relative_orientation.solution import ELEMENTS
-from photostrip.terrestrial.forecast import PLACES, DisplacementSpec, plan_displacements
+from photostrip.terrestrial.accuracy import PLACES, DisplacementSpec, plan_displacements
 from photostrip.units import MICROMETRES
 
 

@@ -19,7 +19,7 @@ from photostrip.notes import Document
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
 
-MORE_DECIMALS, MORE_DIGITS = 2, 4  # of JSON and CSV, that are not printed
+MORE_DECIMALS, MORE_DIGITS = 3, 4  # of JSON and CSV, that are not printed
 PRINTED = {"um": "µm", "arcsec": "″", "arcmin": "′", "percent": "%", "ratio": ""}  # units
 
 

@@ -9,7 +9,7 @@ from importlib import resources
 from typing import NamedTuple
 
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
-from photostrip.planning.model.plan import source_example
+from photostrip.planning.model_plan import source_example
 from photostrip.report.page.parts import Words
 from photostrip.sheets.sheet import Field, Rows, Sheet, fields
 from photostrip.terrestrial.accuracy import EXAMPLES, worked

@@ -9,9 +9,8 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import Document, counted, listed
-from photostrip.planning.strip.design import DesignReport, Outcome, along_the_strip
-from photostrip.planning.strip.ideal_strip import ControlLayout, IdealStrip, Spot, numbers_of
-from photostrip.planning.strip.placement import BestPlaces, worst
+from photostrip.planning.ideal_strip import ControlLayout, IdealStrip, Spot, numbers_of
+from photostrip.planning.strip_design import BestPlaces, DesignReport, Outcome, along_the_strip, worst
 from photostrip.report.page.parts import DASH, Words
 from photostrip.result.numbers import rms
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, plain, written

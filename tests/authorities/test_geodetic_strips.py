@@ -13,7 +13,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.run import triangulate
-from photostrip.strip.polynomial import correction
+from photostrip.strip import polynomial
 from tests.strips import control_points, measured
 from tests.vectors import vector
 
@@ -49,7 +49,7 @@ def run(name: str, frame: str, adjustment: str, degree: str = "auto") -> Result:
     control = control_points(given, check=list(check))
     strip = Strip("A", Camera("camera", example.input["f"]), observations.photo_ids)
     spec = GEOGRAPHIC if frame == "geographic" else GEOCENTRIC
-    settings = Settings(adjustment=adjustment, polynomial=correction.PolynomialSettings(degree))
+    settings = Settings(adjustment=adjustment, polynomial=polynomial.PolynomialSettings(degree))
     return triangulate(Inputs(name, (strip,), observations, control, (spec,)), settings)
 
 

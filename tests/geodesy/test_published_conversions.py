@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photostrip.geodesy.curvature import eccentricity_squared
-from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic, mean_position
+from photostrip.geodesy.local_frame import (
+    IntermediateFrame,
+    axes_matrix,
+    eccentricity_squared,
+    geocentric_from_geodetic,
+    mean_position,
+)
 from tests.geodesy.frames import ENU, NEU, XYZ, columns, frame, pair, rows, spec, with_height
 from tests.loops import nonempty
 from tests.vectors import Vector, cases

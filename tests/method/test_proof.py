@@ -37,7 +37,7 @@ from photostrip.simulation import (
     Terrain,
     simulate,
 )
-from photostrip.strip.polynomial import correction
+from photostrip.strip import polynomial
 from tests.attitudes import angle_between
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
@@ -205,7 +205,7 @@ def test_any_control_that_determines_the_strip_brings_it_back(control: Control, 
 @pytest.mark.parametrize("degree", ["1", "2", "3"])
 def test_no_adjustment_spoils_what_is_exact(adjustment: str, degree: str) -> None:
     spec = exact(Spec(flight=Flight(photos=15), control=Control(bands=4)))
-    asked = Settings(adjustment=adjustment, polynomial=correction.PolynomialSettings(degree))
+    asked = Settings(adjustment=adjustment, polynomial=polynomial.PolynomialSettings(degree))
     found = recovered(spec, asked)
     assert_exact(found)
     used = found.result.strips[0].polynomial
@@ -326,7 +326,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
             simple = choice == "similarity"
             asked = Settings(
                 adjustment="similarity" if simple else "polynomial",
-                polynomial=correction.PolynomialSettings("auto" if simple else choice),
+                polynomial=polynomial.PolynomialSettings("auto" if simple else choice),
                 precision=False,
             )
             squares[choice].append(Recovery(done, triangulate(inputs, asked)).along_across_up())

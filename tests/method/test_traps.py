@@ -16,8 +16,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
-from photostrip.strip import absolute_orientation
-from photostrip.strip.polynomial import correction
+from photostrip.strip import absolute_orientation, polynomial
 from tests.results import write_project
 from tests.simulated import inputs_of
 
@@ -40,7 +39,7 @@ PLANE_MAP = replace(
 
 
 def degree(asked: str) -> Settings:
-    return Settings(adjustment="polynomial", polynomial=correction.PolynomialSettings(asked))
+    return Settings(adjustment="polynomial", polynomial=polynomial.PolynomialSettings(asked))
 
 
 def errors(simulation: Simulation, result: Result) -> Floats:

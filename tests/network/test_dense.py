@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.cofactors import (
-    JointCofactors,
-    cofactors_of,
-)
-from photostrip.network.problem import (
-    AttitudeObservations,
-    BundleProblem,
-    ControlObservations,
-    PositionObservations,
-)
-from photostrip.network.solve import solve
+from photostrip.network.adjustment import solve
+from photostrip.network.cofactors import JointCofactors, cofactors_of
+from photostrip.network.problem import AttitudeObservations, BundleProblem, ControlObservations, PositionObservations
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Points, Spec, simulate
 from tests.bundles import dense
@@ -31,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.network.solution import BundleSolution, Cofactors
+    from photostrip.network.adjustment import BundleSolution, Cofactors
     from tests.bundles import Dense
 
     Floats = NDArray[np.float64]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.network import hypotheses
+from photostrip.network.adjustment import solve
 from photostrip.network.hypotheses import (
     DECENTRED,
     DISTANCE,
@@ -25,15 +26,14 @@ from photostrip.network.hypotheses import (
     most_likely,
 )
 from photostrip.network.problem import PositionObservations
-from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.loops import nonempty
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
+    from photostrip.network.adjustment import BundleSolution
     from photostrip.network.hypotheses import Hypothesis
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution
 
 
 def with_positions_and_lists() -> BundleProblem:

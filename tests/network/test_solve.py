@@ -11,13 +11,8 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.problem import (
-    BundleProblem,
-    ControlObservations,
-    ImageObservations,
-    StartValues,
-)
-from photostrip.network.solve import solve
+from photostrip.network.adjustment import solve
+from photostrip.network.problem import BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Image, Points, Spec, simulate
 from tests.simulated_bundle import problem_of, truth_of
@@ -146,7 +141,7 @@ def test_steps_without_end_say_what_is_wrong_with_the_control(
         along = np.outer(middle @ axis, axis)
         xyz = xyz.mean(axis=0) + along + breadth * (middle - along)
     xyz[0, 0] += off
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=words) as caught:
         solve(replace(problem, control=replace(problem.control, xyz=xyz)))
     assert caught.value.code == "bundle-diverged"
@@ -154,7 +149,7 @@ def test_steps_without_end_say_what_is_wrong_with_the_control(
 
 def test_steps_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = simulated(6, 1)
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=r"did not converge in 1 step$") as caught:
         solve(problem)
     assert caught.value.code == "bundle-diverged"

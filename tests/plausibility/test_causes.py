@@ -5,7 +5,7 @@ from __future__ import annotations
 from photostrip.network.hypotheses import DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER
 from photostrip.network.reliability import CONTROL, IMAGE, POSITION
 from photostrip.plausibility import KINDS
-from photostrip.plausibility.causes import CAUSES
+from photostrip.plausibility.finding import CAUSES
 from photostrip.result.description import described
 from tests.source_tree import modules
 

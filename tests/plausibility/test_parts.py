@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.plausibility.control import layout
-from photostrip.plausibility.control.digits import slip
-from photostrip.plausibility.photos import flight, flight_order, rotations
-from photostrip.plausibility.photos.tied_strips import TiesOfStrips, odd_ties
+from photostrip.plausibility import flight, flight_order, given_points
+from photostrip.plausibility.ids import TiesOfStrips, odd_ties
+from photostrip.plausibility.slips import slip
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec, Terrain
 from tests.simulated import inputs_of
@@ -128,8 +127,8 @@ def laid_out(along: list[float], across: list[float], photos: int = 8) -> list[s
     plan = np.column_stack([100.0 * np.array(along), 150.0 * np.array(across)])
     names = [f"G{number}" for number in range(len(along))]
     listed = [f"{number}" for number in range(photos)]
-    on_a_line = layout.find_line(plan, 150.0, names, "strip A", ["A"])
-    return [each.code for each in (*on_a_line, *layout.find_weak_ends(np.array(along), listed, "A", names))]
+    on_a_line = given_points.find_line(plan, 150.0, names, "strip A", ["A"])
+    return [each.code for each in (*on_a_line, *given_points.find_weak_ends(np.array(along), listed, "A", names))]
 
 
 def test_where_control_lies() -> None:
@@ -144,7 +143,7 @@ def test_where_control_lies() -> None:
 def test_findings_on_the_layout_count_photos_from_one() -> None:
     names, photos = ["a", "b", "c", "d", "e", "f"], [f"{number}" for number in range(8)]
     place = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
-    (found,) = layout.find_weak_ends(place, photos, "A", names)
+    (found,) = given_points.find_weak_ends(place, photos, "A", names)
     assert found.evidence == {"first_control_at_photo": 2.0, "last_control_at_photo": 4.0, "photos": 8}
 
 
@@ -165,8 +164,8 @@ def attitudes(count: int = 6) -> tuple[Floats, Floats]:
 def test_angles_in_another_unit(factor: float, word: str) -> None:
     values, matrices = attitudes()
     names = [f"{number}" for number in range(len(values))]
-    assert list(rotations.find_wrong_angles(values, "omega-phi-kappa", matrices, names)) == []
-    (finding,) = rotations.find_wrong_angles(values * factor, "omega-phi-kappa", matrices, names)
+    assert list(flight.find_wrong_angles(values, "omega-phi-kappa", matrices, names)) == []
+    (finding,) = flight.find_wrong_angles(values * factor, "omega-phi-kappa", matrices, names)
     assert finding.code == "P601"
     assert f"; as {word} they differ by 0.00" in finding.message
     assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
@@ -176,11 +175,9 @@ def test_angles_in_another_system() -> None:
     values, matrices = attitudes()
     names = [f"{number}" for number in range(len(values))]
     for wrong in (values * [1, 1, -1], values + np.array([0, 0, np.pi / 2]), values * [-1, 1, 1]):
-        assert [each.code for each in rotations.find_wrong_angles(wrong, "omega-phi-kappa", matrices, names)] == [
-            "P602"
-        ]
+        assert [each.code for each in flight.find_wrong_angles(wrong, "omega-phi-kappa", matrices, names)] == ["P602"]
     rough = values + np.random.default_rng(1).normal(0, np.radians(3), values.shape)
-    assert list(rotations.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
+    assert list(flight.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
 
 
 def test_yaw_pitch_roll_of_a_gimbal() -> None:
@@ -189,7 +186,7 @@ def test_yaw_pitch_roll_of_a_gimbal() -> None:
     names = [f"{number}" for number in range(len(matrices))]
     gimbal = Rotation.from_matrix(matrices) * Rotation.from_euler("x", -90, degrees=True)
     stated = gimbal.as_euler("ZXY") * [-1, 1, 1]
-    (finding,) = rotations.find_wrong_angles(stated, "yaw-pitch-roll", matrices, names)
+    (finding,) = flight.find_wrong_angles(stated, "yaw-pitch-roll", matrices, names)
     assert finding.code == "P602"
     assert "of a camera that looks ahead where pitch and roll are zero" in finding.message
 

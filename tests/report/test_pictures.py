@@ -23,7 +23,7 @@ from photostrip.report.pictures.places import plan_of, rays_of
 from photostrip.report.pictures.result import picture_files, pictures_of
 from photostrip.result.records import as_lists
 from photostrip.simulation import Models
-from photostrip.simulation.ground import surface
+from photostrip.simulation.flight import surface
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Ground, Image, Spec, Terrain
 from tests.loops import nonempty

@@ -12,7 +12,7 @@ from scipy import stats
 from photostrip.errors import InputError
 from photostrip.points import locate
 from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec, simulate
-from photostrip.simulation.control import band_photos
+from photostrip.simulation.placement import band_photos
 from tests.loops import nonempty
 
 NONE = (0.0, 0.0, 0.0)

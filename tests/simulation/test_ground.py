@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pyproj import Geod, Transformer
 
 from photostrip.simulation import Flight, Ground, Spec, Terrain
-from photostrip.simulation.ground import world
+from photostrip.simulation.flight import world
 
 GRS80 = (6378137.0, 6356752.314140356)
 ELLIPSOID_SHAPE = 0.004  # a flight on normals against a geodesic: the ellipsoid is not a sphere

@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.accuracy import (
-    EXAMPLES,
-    as_printed,
-    grid,
-    required,
-    worked,
-)
-from photostrip.terrestrial.frame import directions_from_photo, ground_from_photo
+from photostrip.terrestrial.accuracy import EXAMPLES, as_printed, grid, required, worked
+from photostrip.terrestrial.normal_case import directions_from_photo, ground_from_photo
 from tests.loops import nonempty
 from tests.vectors import cases
 

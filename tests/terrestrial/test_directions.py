@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.terrestrial.frame import (
+from photostrip.terrestrial.normal_case import (
     direction_gradient,
     directions_from_photo,
     directions_of,

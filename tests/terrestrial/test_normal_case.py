@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.frame import ground_from_photo, small_turn
-from photostrip.terrestrial.normal_case import StereoPair, intersect, meeting_z, to_normal
+from photostrip.terrestrial.normal_case import (
+    StereoPair,
+    ground_from_photo,
+    intersect,
+    meeting_z,
+    small_turn,
+    to_normal,
+)
 from tests.terrestrial.simulated import CENTERS, FOCAL, SIGMA, attitude, photo, world
 
 if TYPE_CHECKING:

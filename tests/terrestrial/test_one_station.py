@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.terrestrial.frame import ground_from_photo
-from photostrip.terrestrial.one_station import OneStation, one_station
+from photostrip.terrestrial.camera_motion import OneStation, one_station
+from photostrip.terrestrial.normal_case import ground_from_photo
 from tests.draws import orthogonal_normal
 from tests.terrestrial.simulated import ARCSECOND, about, attitude, photo
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.frame import ground_from_photo
+from photostrip.terrestrial.normal_case import ground_from_photo
 from photostrip.terrestrial.orientation import OrientationSettings, Sightings, orient
 from tests.draws import orthogonal_normal
 from tests.terrestrial.simulated import ARCSECOND, attitude

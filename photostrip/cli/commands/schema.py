@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from photostrip.planning import PlanKind
+from photostrip.terrestrial import TerrestrialKind
 
 
 def schema(
@@ -17,6 +18,10 @@ def schema(
     plan: Annotated[
         PlanKind | None,
         typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
+    ] = None,
+    terrestrial: Annotated[
+        TerrestrialKind | None,
+        typer.Option("--terrestrial", help="The file of this computation of `photostrip terrestrial` instead."),
     ] = None,
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
@@ -47,7 +52,10 @@ def schema(
         found = result_schema()
     else:
         flags = {"tolerances": tolerances, "simulation": simulation}
-        kind = next((name for name, wanted in flags.items() if wanted), plan or "project")
+        kind = next(
+            (name for name, wanted in flags.items() if wanted),
+            plan or (f"terrestrial {terrestrial}" if terrestrial else "project"),
+        )
         found = schema_of(kind)
     text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
     if output is None:

@@ -12,10 +12,24 @@ import numpy as np
 from photostrip.errors import InputError
 from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
-from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
+from photostrip.project.plans.flown import Percent, SigmaUm
 from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
-from photostrip.project.schema.values import Id, Number, Positive, Range, Words, bounded, one_of
+from photostrip.project.schema.sections import (
+    After,
+    FirstSchema,
+    Id,
+    Number,
+    Positive,
+    Range,
+    Section,
+    Words,
+    bounded,
+    key,
+    length,
+    rule,
+    wrong,
+)
+from photostrip.project.yaml.reading import read_keys
 from photostrip.units import MICROMETRES
 
 Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
@@ -63,7 +77,7 @@ class PlanCamera(Section):
 class CameraPlanFile(Section):
     """Cameras to compare."""
 
-    photostrip_plan_cameras: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_cameras: FirstSchema = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the comparison", "cameras")
     end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
@@ -115,7 +129,7 @@ class CameraPlan(NamedTuple):
 
 def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     """Read a list of cameras to compare, or raise every fault of it."""
-    given, reading = read_plan(CameraPlanFile, path, assignments)
+    given, reading = read_keys(CameraPlanFile, path, assignments)
     cameras = tuple(_plan_camera(str(name), each, given) for name, each in given.cameras.items())
     named = {camera.name: camera for camera in cameras}
     return CameraPlan(

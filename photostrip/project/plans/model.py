@@ -6,11 +6,29 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
-from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
-from photostrip.project.schema.values import Id, Number, Pair, Positive, Range, Triple, Whole, Words, bounded, one_of
+from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
+from photostrip.project.plans.flown import Flown, Sigmas
+from photostrip.project.schema.sections import (
+    After,
+    Before,
+    FirstSchema,
+    Id,
+    Number,
+    Pair,
+    Positive,
+    Range,
+    Section,
+    Triple,
+    Whole,
+    Words,
+    bounded,
+    key,
+    one_of,
+    rule,
+    wrong,
+)
 from photostrip.project.simulation import camera_of
+from photostrip.project.yaml.reading import read_keys
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
 USES = ("xyz", "xy", "z")
@@ -94,7 +112,7 @@ def _listed(value: object) -> object:
 class ModelPlanFile(Flown):
     """Expected errors over one model. Every key but the first has a default."""
 
-    photostrip_plan_model: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_model: FirstSchema = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "model")
     base: Positive | None = key("Photo base, instead of the overlap", None, unit="mm")
     reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
@@ -147,7 +165,7 @@ class ModelPlan(NamedTuple):
 
 def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
     """Read the plan of a model, or raise all its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(ModelPlanFile, path, assignments)
+    given, reading = read_keys(ModelPlanFile, path, assignments)
     camera = camera_of(given.camera)
     along, across = camera.format or (230.0, 230.0)
     base = given.base or along * (1.0 - given.end_lap_percent / 100.0)

@@ -7,20 +7,26 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
-from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
-from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.plans.flown import SigmaUm
+from photostrip.project.schema.sections import (
+    After,
+    FirstSchema,
     Fraction,
     NotNegative,
     Number,
     Positive,
     Range,
+    Section,
     Whole,
     Words,
     bounded,
     choice,
-    one_of,
+    key,
+    length,
+    rule,
+    wrong,
 )
+from photostrip.project.yaml.reading import read_keys
 from photostrip.strip.relative_orientation.orientation import SCREENINGS
 
 MICROMETRES = 1000.0  # in a millimetre
@@ -37,7 +43,7 @@ Count = Annotated[Whole, After(bounded(POINTS))]
 class ScreeningPlanFile(Section):
     """An experiment with gross errors in pairs; the defaults are the published one."""
 
-    photostrip_plan_screening: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_screening: FirstSchema = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "screening")
     principal_distance: Annotated[Number, After(bounded(FOCAL))] = key(
@@ -90,7 +96,7 @@ class ScreeningPlan(NamedTuple):
 
 def load_screening_plan(path: Path | None, assignments: Sequence[str]) -> ScreeningPlan:
     """Read the plan of an experiment, or raise its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(ScreeningPlanFile, path, assignments)
+    given, reading = read_keys(ScreeningPlanFile, path, assignments)
     layout = PairLayout(
         focal=given.principal_distance,
         base=given.base,

@@ -8,16 +8,38 @@ from pathlib import Path
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.planning.strip.design import DesignReport, DesignTask, plan_strip
-from photostrip.planning.strip.ideal_strip import LAYOUTS, LEAST_PHOTOS, USES, ControlLayout, Spot, StripGeometry
-from photostrip.planning.strip.methods import BUNDLE, METHODS
-from photostrip.planning.strip.placement import Demand, Placement
-from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
-from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of
+from photostrip.planning.ideal_strip import (
+    BUNDLE,
+    LAYOUTS,
+    LEAST_PHOTOS,
+    METHODS,
+    USES,
+    ControlLayout,
+    Spot,
+    StripGeometry,
+)
+from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
+from photostrip.project.plans.flown import Flown, Sigmas
+from photostrip.project.schema.sections import (
+    After,
+    Before,
+    FirstSchema,
+    Flag,
+    Id,
+    Positive,
+    Range,
+    Section,
+    Whole,
+    Words,
+    bounded,
+    key,
+    length,
+    one_of,
+    rule,
+    wrong,
+)
 from photostrip.project.simulation import camera_of
-from photostrip.project.yaml.reading import Reading
-from photostrip.project.yaml.validation import valid_section
+from photostrip.project.yaml.reading import Reading, read_keys, valid_section
 from photostrip.simulation import Points
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
@@ -128,7 +150,7 @@ class StripPlacement(Section):
 class StripPlanFile(Flown):
     """A strip and layouts of its control. Every key but the first has a default."""
 
-    photostrip_plan_strip: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_strip: FirstSchema = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "strip")
     models: Annotated[Whole, After(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
     points: StripPoints = key("Pass points", StripPoints())
@@ -179,7 +201,7 @@ class StripPlan:
 
 def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     """Read the plan of a strip, or raise all its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(StripPlanFile, path, assignments)
+    given, reading = read_keys(StripPlanFile, path, assignments)
     camera = camera_of(given.camera)
     geometry = StripGeometry(
         camera=camera,

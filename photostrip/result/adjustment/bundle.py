@@ -12,8 +12,8 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
-from photostrip.network.given_orientations import drift_columns
 from photostrip.network.hypotheses import ALL, DRIFT, HEIGHTS_ONLY, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
+from photostrip.network.observations import drift_columns
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import BundleSettings
 from photostrip.notes import Document
@@ -62,7 +62,7 @@ def bundle_of(result: Result) -> Document:
         return {}
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
-    shift = reliability.noncentrality(screened.limit.alpha, settings.power)
+    shift = screened.limit.shifts(settings.power)
     written = kinds(result.settings.angle_unit, of_models=problem.of_models)
     block: Document = {
         "free_network": solution.free,
@@ -90,8 +90,8 @@ def bundle_of(result: Result) -> Document:
         "screening": _screening(found, settings, written),
         "reliability": {
             "power": settings.power,
-            "noncentrality": shift,
-            "groups": [_group(group, shift, written[group.kind]) for group in found.groups],
+            "noncentrality": shift[reliability.IMAGE],
+            "groups": [_group(group, shift[group.kind], written[group.kind]) for group in found.groups],
             "weakest": _foremost(found, shift, written, [-group.redundancy for group in found.groups]),
             "worst": _foremost(found, shift, written, [np.abs(group.standardised) for group in found.groups]),
         },
@@ -99,7 +99,7 @@ def bundle_of(result: Result) -> Document:
         "calibration": _calibration(found),
         "correlations": [asdict(each) for each in found.correlations],
         "given": Records.joined(
-            records("bundle.given", _observed(found, group, np.argwhere(known), shift, written[group.kind]))
+            records("bundle.given", _observed(found, group, np.argwhere(known), shift[group.kind], written[group.kind]))
             for group in found.groups
             if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
         ),
@@ -263,7 +263,7 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     found = result.bundle
     if found is None or result.model_strips:
         return residuals
-    shift = reliability.noncentrality(found.screened.limit.alpha, result.settings.bundle.power)
+    shift = found.screened.limit.shifts(result.settings.bundle.power)[reliability.IMAGE]
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
     values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
     values = np.vstack([values, np.full(len(RELIABILITY), np.nan)])  # the last row: a ray that took no part
@@ -276,7 +276,9 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     return [each | more for each, more in zip(residuals, added, strict=True)]
 
 
-def _foremost(found: Bundle, shift: float, written: Mapping[str, GroupKind], values: list[Floats]) -> list[Document]:
+def _foremost(
+    found: Bundle, shift: Mapping[str, float], written: Mapping[str, GroupKind], values: list[Floats]
+) -> list[Document]:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
     for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
@@ -288,7 +290,7 @@ def _foremost(found: Bundle, shift: float, written: Mapping[str, GroupKind], val
     for _, number, at in sorted(chosen)[:SHOWN]:
         group = found.groups[number]
         place = np.array([divmod(at, group.sigma.shape[1])])
-        rows += as_records(_observed(found, group, place, shift, written[group.kind]))
+        rows += as_records(_observed(found, group, place, shift[group.kind], written[group.kind]))
     return rows
 
 

@@ -16,7 +16,7 @@ from photostrip.points import locate
 from photostrip.result.numbers import rms
 from photostrip.result.points.given import differences, of_used
 from photostrip.result.quantities import record
-from photostrip.strip.polynomial.terms import degree_of
+from photostrip.strip.polynomial_terms import degree_of
 
 
 def classical_of(result: Result) -> Document:

@@ -18,7 +18,7 @@ from photostrip.result.adjustment import links, pairs
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
-from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.polynomial import Polynomial
 
 
 def strip_of(result: Result, strip: StripResult) -> Document:

@@ -18,7 +18,7 @@ from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
 from photostrip.result.records import Named, Records
-from photostrip.strip.resection.collinearity import depths, project
+from photostrip.strip.resection import depths, project
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import record, records
 from photostrip.result.records import Records
 from photostrip.statistics import chi2_quantile, normal_quantile, squares_p_value
-from photostrip.strip.error_propagation.check_errors import CheckErrors
+from photostrip.strip.fitted_strip import CheckErrors
 
 ROWS, COLUMNS = np.triu_indices(6)
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.planning.model.plan import ModelSpec, control_layout, given_errors, plan_model
+from photostrip.planning.model_plan import ModelSpec, control_layout, given_errors, plan_model
 from photostrip.project.plans.model import load_model_plan
 from tests.loops import nonempty
 
@@ -432,7 +432,7 @@ def test_displacements_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[s
     file = tmp_path / "d.yaml"
     file.write_text(
         "photostrip_plan_displacement: 1\nbase: 30\ndistances: [50, 120]\nsigma_d_um: 5.656854249492381\n"
-        "principal_distance: 100\nformat: [160, 120]\n"
+        "camera: UMK 10/1318\n"
     )
     assert answer(capsys, "plan", "displacement", str(file), "--format", "json") == from_options
     document = json.loads(from_options)

@@ -13,16 +13,12 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.gross_errors import point_decisions
-from photostrip.network.gross_errors.point_decisions import (
-    CAUSES,
-    Decisions,
-    PointRays,
-)
+from photostrip.network import testing
 from photostrip.network.reliability import Limit
+from photostrip.network.testing import CAUSES, Decisions, PointRays
 from photostrip.rejection import SEVERAL_RAYS, WRONG_RAY
 from photostrip.statistics import normal_quantile
-from photostrip.strip.resection.collinearity import KnownPhotos, derivatives
+from photostrip.strip.resection import KnownPhotos, derivatives
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -34,7 +30,8 @@ SEEDS = st.integers(0, 2**31)
 
 
 def limit(alpha: float = ALPHA) -> Limit:
-    return Limit(normal_quantile(1 - alpha / 2), normal_quantile(1 - alpha / 4), alpha, 1.0)
+    value, both = (normal_quantile(1 - level / 2) for level in (alpha, alpha / 2))
+    return Limit(value=value, both=both, given=value, alpha=alpha, alpha_of_given=alpha, unit=1.0)
 
 
 def a_point(seed: int, rays: int = 3) -> PointRays:
@@ -71,7 +68,7 @@ def each_of(decided: Decisions) -> list[Decision]:
 
 def decide(point: PointRays, limit: Limit) -> Decision:
     """Decide on one point."""
-    (found,) = each_of(point_decisions.decide(together(point), limit))
+    (found,) = each_of(testing.decide(together(point), limit))
     return found
 
 
@@ -89,9 +86,7 @@ def together(*points: PointRays) -> PointRays:
 def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[Floats, Floats]:
     """Take sets of rays of one point out: sums of squares (s,) and errors (s, k, 2)."""
     normal = basis @ weight @ basis.T
-    found = point_decisions._without(
-        np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2
-    )
+    found = testing._without(np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2)
     return found.left[0], found.errors[0]
 
 
@@ -99,8 +94,8 @@ def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[
 def test_sets_of_many_points_are_taken_out_as_one_by_one(count: int) -> None:
     random = np.random.default_rng(count)
     root, pulled, total = random.normal(size=(5, 12, 15)), random.normal(size=(5, 12)), random.normal(size=5)
-    normal, sets = root @ root.swapaxes(1, 2), point_decisions.ray_sets(6, count).rays
-    left, errors = point_decisions._without(total, pulled, normal, sets, 2)
+    normal, sets = root @ root.swapaxes(1, 2), testing.ray_sets(6, count).rays
+    left, errors = testing._without(total, pulled, normal, sets, 2)
     for point, (row, rays) in nonempty(itertools.product(range(5), enumerate(sets))):
         at = (2 * rays[:, None] + np.arange(2)).ravel()
         error = np.linalg.solve(normal[point][np.ix_(at, at)], pulled[point, at])
@@ -139,15 +134,15 @@ def test_a_point_that_took_part_is_predicted_as_if_it_had_not(rays: int, gone: t
         inside=rows,
         misfit=point.misfit - by_photos @ shift[: 6 * rays] - point.by_point @ shift[6 * rays :],
     )
-    expected = point_decisions._misclosures(replace(point, of_photos=by_photos @ before @ by_photos.T))
-    found = point_decisions._misclosures(after)
+    expected = testing._misclosures(replace(point, of_photos=by_photos @ before @ by_photos.T))
+    found = testing._misclosures(after)
     assert found.gap == pytest.approx(expected.gap, rel=1e-5, abs=1e-5)
     assert found.weight == pytest.approx(expected.weight, rel=1e-5, abs=1e-7)
 
 
 def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() -> None:
     point = a_point(3, 5)
-    gap, weight, basis = point_decisions._misclosures(point)
+    gap, weight, basis = testing._misclosures(point)
     sets = [(0,), (3,), (4,)]
     left, errors = without(gap, weight, basis, np.array(sets))
     for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):

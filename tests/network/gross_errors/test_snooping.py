@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.network.gross_errors import snooping, strip_network
+from photostrip.network import snooping, strip_rays
+from photostrip.network.adjustment import Selection
 from photostrip.network.reliability import groups_of
-from photostrip.network.selection import Selection
 from photostrip.network.settings import BundleSettings
 from photostrip.rejection import UNCONTROLLED
 from photostrip.simulation import Flight, Points, Spec
@@ -36,7 +36,10 @@ def rays_of(problem: BundleProblem, point: int) -> Numbers:
 
 
 def test_the_level_grows_with_the_errors_that_are_established(problem: BundleProblem) -> None:
-    """Nothing established: all tests together have the level; then so many times as much [Gavrilov 2009]."""
+    """Nothing established: all tests together have the level; then so many times as much [Gavrilov 2009].
+
+    Wrong rays do not sharpen the test of control, wrong control does.
+    """
     every = Selection.everything(problem)
     for known, point in ((0, 0), (5, 5)):
         images = problem.images.point >= point  # without the first points
@@ -47,12 +50,36 @@ def test_the_level_grows_with_the_errors_that_are_established(problem: BundlePro
         q, i, m = 0.01, known + 1, int(sum(each.sum() for each in every_test)) + known
         assert m > 2 * done.solution.redundancy  # there are more tests than conditions
         assert done.limit.alpha == pytest.approx(i * q / (m + 1 - i * (1 - q)))
+        assert done.limit.alpha_of_given == pytest.approx(q / (m - known + q))
+    control = every.control.copy()
+    control[tuple(np.argwhere(control)[0])] = False
+    every_given, less = (
+        snooping.ScreenedBundle.of(problem, replace(every, control=flags), BundleSettings()).limit
+        for flags in (every.control, control)
+    )
+    assert less.alpha_of_given == pytest.approx(2.0 * every_given.alpha_of_given, rel=0.02)
 
 
 def test_the_level_along_a_strip() -> None:
     """At a twentieth of the points wrong, as in the benchmark, errors of 3.7 standard deviations are found."""
-    q, i, left = strip_network.STRIP_LEVEL, 18, 900
+    q, i, left = strip_rays.STRIP_LEVEL, 18, 900
     assert normal_quantile(1 - i * q / (left + i * q) / 2) == pytest.approx(3.68, abs=0.08)
+
+
+def test_control_comes_back_with_the_rays_that_agree_with_it(problem: BundleProblem) -> None:
+    """A strip may leave out a control point and its rays, for a wrong one that meets the other all the same."""
+    rays = np.bincount(problem.images.point, minlength=problem.points)
+    given = problem.control.point[np.isfinite(problem.control.sigma).all(axis=1)]
+    at = int(given[rays[given] == 2][0])
+    good, wrong = rays_of(problem, at)
+    xy = problem.images.xy.copy()
+    xy[wrong, 0] += 0.3  # mm, along the base
+    spoiled, every = replace(problem, images=replace(problem.images, xy=xy)), Selection.everything(problem)
+    begin = replace(every, images=problem.images.point != at, control=every.control.copy())
+    begin.control[problem.control.point == at] = False
+    done = snooping.screen_bundle(spoiled, begin, BundleSettings())
+    assert done.selection.control[problem.control.point == at].all()
+    assert done.selection.images[[good, wrong]].tolist() == [True, False]
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.network.gross_errors import strip_network
+from photostrip.network import strip_rays
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.rejection import WRONG_RAY
@@ -17,7 +17,7 @@ from tests.strips import MICROMETRE, control_points, fly, project
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.network.gross_errors.strip_rays import StripRays
+    from photostrip.network.strip_rays import StripRays
     from photostrip.pipeline.results import Result
     from photostrip.strip.relative_orientation.orientation import Orientation
     from tests.strips import Flown
@@ -83,13 +83,13 @@ def test_the_wrong_ray_across_the_base_is_named_and_the_point_kept(photo: str, p
 def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five times the standard deviation on one photo: the others keep theirs."""
     found: list[Floats] = []
-    spread_of = strip_network._spread_of_photos
+    spread_of = strip_rays._spread_of_photos
 
     def kept(oriented: Orientation, rays: StripRays) -> Floats:
         found.append(spread_of(oriented, rays))
         return found[-1]
 
-    monkeypatch.setattr(strip_network, "_spread_of_photos", kept)
+    monkeypatch.setattr(strip_rays, "_spread_of_photos", kept)
     strip = flown(extra=200)
     xy, at = strip.observations.xy.copy(), strip.observations.photo == 6
     xy[at] += np.random.default_rng(3).normal(0, np.sqrt(24) * SIGMA, (at.sum(), 2))

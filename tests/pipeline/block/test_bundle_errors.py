@@ -10,7 +10,7 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.network import reliability
-from photostrip.network.solve import solve
+from photostrip.network.adjustment import solve
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from tests.loops import nonempty

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import (
+from photostrip.planning.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.planning.model.closed_form import ORDER, coefficients, control_sums, kernels
-from photostrip.planning.model.single_model import ELEMENTS, ModelControl, influence, orientation_operator
+from photostrip.planning.closed_form import ORDER, coefficients, control_sums, kernels
+from photostrip.planning.single_model import ELEMENTS, ModelControl, influence, orientation_operator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

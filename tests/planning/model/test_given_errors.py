@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.plan import ControlPoint, ModelSpec, NamedPoint, given_errors, plan_model
+from photostrip.planning.model_plan import ControlPoint, ModelSpec, NamedPoint, given_errors, plan_model
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import intersected
 

@@ -10,17 +10,34 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.planning.strip.design import DesignTask, bands_needed, outcome, plan_strip
-from photostrip.planning.strip.ideal_strip import ControlLayout, Spot, StripGeometry, ideal_strip, spots_of
-from photostrip.planning.strip.methods import BUNDLE, METHODS, SIMILARITY, accuracy
-from photostrip.planning.strip.placement import Demand, Placement, best_places, worst
+from photostrip.planning.ideal_strip import (
+    BUNDLE,
+    METHODS,
+    SIMILARITY,
+    ControlLayout,
+    Spot,
+    StripGeometry,
+    accuracy,
+    ideal_strip,
+    spots_of,
+)
+from photostrip.planning.strip_design import (
+    Demand,
+    DesignTask,
+    Placement,
+    bands_needed,
+    best_places,
+    outcome,
+    plan_strip,
+    worst,
+)
 from photostrip.simulation import FILM, Points
-from photostrip.strip.gross_errors.pairs.screening import DETECTABLE
+from photostrip.strip.gross_errors.pair_screening import DETECTABLE
 from tests.loops import nonempty
 from tests.planning.strip.repeated import scatter
 
 if TYPE_CHECKING:
-    from photostrip.planning.strip.ideal_strip import IdealStrip
+    from photostrip.planning.ideal_strip import IdealStrip
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 

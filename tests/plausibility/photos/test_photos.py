@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photostrip.plausibility.photos import flight_order, units
+from photostrip.plausibility import flight_order, units
 from photostrip.points import PhotoPoints
 from photostrip.simulation import Flight, Spec, simulate
 

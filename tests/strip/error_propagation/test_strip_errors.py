@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.precision.photo_precision import photo_errors
+from photostrip.pipeline.precision import photo_errors
 from photostrip.pipeline.run import triangulate
-from photostrip.strip.error_propagation import fitted_strip as fitted
-from photostrip.strip.polynomial import correction
+from photostrip.strip import fitted_strip as fitted
+from photostrip.strip import polynomial
 from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.derivatives import (
     UNSCREENED,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.pipeline.results import Result
-    from photostrip.strip.error_propagation.fitted_strip import FittedStrip
+    from photostrip.strip.fitted_strip import FittedStrip
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
@@ -43,7 +43,7 @@ def settings(adjustment: str, transfer: str = "least_squares", intersection: str
         adjustment="similarity" if adjustment == "similarity" else "polynomial",
         relative=UNSCREENED,
         formation=StripFormationSettings(transfer, intersection=intersection),
-        polynomial=correction.PolynomialSettings(degree),
+        polynomial=polynomial.PolynomialSettings(degree),
     )
 
 

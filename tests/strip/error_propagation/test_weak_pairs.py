@@ -10,10 +10,10 @@ import pytest
 
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import DIGITAL, Flight, Ground, Image, Points, Spec, Terrain, simulate
-from photostrip.strip.error_propagation.weak_pairs import times_a_good_pair
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import Pairs
 from photostrip.strip.relative_orientation.solution import base_rays, solve_elements, turns
+from photostrip.strip.strip_errors import times_a_good_pair
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:

@@ -15,8 +15,13 @@ from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections, lens_distortion
-from photostrip.strip.image_coordinates.corrections import Bending, Refined, curvature_constant, refraction_constant
-from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
+from photostrip.strip.image_coordinates.corrections import (
+    Bending,
+    ImageCorrectionSettings,
+    Refined,
+    curvature_constant,
+    refraction_constant,
+)
 
 Floats = NDArray[np.float64]
 

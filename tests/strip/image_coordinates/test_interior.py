@@ -14,8 +14,8 @@ from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import interior
+from photostrip.strip.image_coordinates.corrections import InteriorSettings
 from photostrip.strip.image_coordinates.interior import InteriorOrientation, linear_shape
-from photostrip.strip.image_coordinates.settings import InteriorSettings
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

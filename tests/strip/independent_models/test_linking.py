@@ -16,8 +16,8 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models, models_of
-from photostrip.strip.independent_models import link_screening, linking
-from photostrip.strip.independent_models.settings import LinkSettings
+from photostrip.strip.independent_models import linking
+from photostrip.strip.independent_models.linking import LinkSettings
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
@@ -160,8 +160,8 @@ def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
         models = models_of(strip_of(measured), measured, LinkSettings())
         shared = linking.common(models)
         none = np.zeros(len(shared.link), bool)
-        plain = link_screening.screen_links(shared, models, LinkSettings("none"), none)
-        size = link_screening.detectable(shared, plain)[0]
+        plain = linking.screen_links(shared, models, LinkSettings("none"), none)
+        size = linking.detectable(shared, plain)[0]
         solved = plain.solved
         reduced = solved.weight - solved.weight @ solved.design @ solved.cofactors[
             shared.link] @ solved.design.transpose(0, 2, 1) @ solved.weight  # fmt: skip

@@ -15,10 +15,10 @@ from scipy.stats import f as f_distribution
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings as RunSettings
 from photostrip.pipeline.run import triangulate
+from photostrip.strip import polynomial
 from photostrip.strip.absolute_orientation import PointPrecision, weights
-from photostrip.strip.polynomial import correction
-from photostrip.strip.polynomial.correction import FitProblem, PolynomialSettings, fit
-from photostrip.strip.polynomial.terms import DROP_ORDER, LADDER, POWERS, choose_terms
+from photostrip.strip.polynomial import FitProblem, PolynomialSettings, fit
+from photostrip.strip.polynomial_terms import DROP_ORDER, LADDER, POWERS, choose_terms
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.strips import MICROMETRE, control_points, fly, project, targets
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from photostrip.pipeline.results import Result
-    from photostrip.strip.polynomial.correction import Evidence, Polynomial
+    from photostrip.strip.polynomial import Evidence, Polynomial
     from tests.strips import Flown
     from tests.vectors import Vector
 
@@ -268,7 +268,7 @@ def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, given_, sigma=sigma)
     found = fit(one, PolynomialSettings("3"))
     inner = [np.arange(3 * band, 3 * band + 3) for band in range(1, 6)]
-    for group, axes in nonempty(correction.GROUPS):
+    for group, axes in nonempty(polynomial.GROUPS):
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "band"
             terms = {1: ("1", "X", "Y"), 2: SQUARE, 3: CUBIC}[evidence.degree]
@@ -284,7 +284,7 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, PolynomialSettings("2"))
     single = [[row] for row in range(9)]
-    for group, axes in nonempty(correction.GROUPS):
+    for group, axes in nonempty(polynomial.GROUPS):
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "point"
             terms = {1: ("1", "X", "Y"), 2: SQUARE}[evidence.degree]

@@ -17,7 +17,7 @@ from photostrip.notes import counted
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
-from photostrip.strip.error_propagation.image_variance import image_variance
+from photostrip.strip.fitted_strip import image_variance
 from photostrip.strip.relative_orientation.orientation import (
     assess_pairs,
     orient_pairs,

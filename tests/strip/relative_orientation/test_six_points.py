@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
-from photostrip.strip.relative_orientation import six_points
+from photostrip.strip.relative_orientation import standard_points
 from tests.loops import nonempty
 from tests.strips import attitude
 from tests.vectors import cases
@@ -86,9 +86,9 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
     assert found.closing_error == pytest.approx(expected["closing_W"], rel=rel)
     assert found.sigma == pytest.approx(expected["m_q"], rel=rel)
     assert np.allclose(found.residuals, expected["residuals"], rtol=rel, atol=0)
-    q = six_points.cofactors(f, a, b)
+    q = standard_points.cofactors(f, a, b)
     assert np.allclose(q, expected["cofactor"], rtol=rel, atol=1e-18)
-    t = six_points.dependent_from_base(b)
+    t = standard_points.dependent_from_base(b)
     dependent = t @ q @ t.T
     formulas = expected["cofactor_formulas"]
     values = {
@@ -124,8 +124,8 @@ def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
 @given(LENGTHS, LENGTHS)
 def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
     f = 153.0
-    t = six_points.dependent_from_base(b)
-    found = t @ six_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
+    t = standard_points.dependent_from_base(b)
+    found = t @ standard_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
     expected = np.zeros((5, 5))
     np.fill_diagonal(
         expected,

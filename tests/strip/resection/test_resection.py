@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from photostrip.strip.resection.collinearity import KnownPhotos, project
-from photostrip.strip.resection.resection import Resection, resect
+from photostrip.strip.resection import KnownPhotos, Resection, project, resect
 from tests.strips import MICROMETRE, attitude, photograph
 
 if TYPE_CHECKING:

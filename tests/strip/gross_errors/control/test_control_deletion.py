@@ -19,10 +19,9 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.strip.absolute_orientation import Targets
-from photostrip.strip.error_propagation.control_errors import Misclosures
-from photostrip.strip.error_propagation.strip_at_control import StripAtControl
-from photostrip.strip.gross_errors.control.control_deletion import adjust
-from photostrip.strip.gross_errors.control.control_rejections import FoundErrors, reliability
+from photostrip.strip.fitted_strip import Misclosures
+from photostrip.strip.gross_errors.control_screening import FoundErrors, reliability
+from photostrip.strip.gross_errors.control_search import StripAtControl, adjust
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, control_points, fly, project
 
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline.results import Result
-    from photostrip.strip.gross_errors.control.control_deletion import JointAdjustment
+    from photostrip.strip.gross_errors.control_search import JointAdjustment
     from tests.strips import Flown
 
     Flags = NDArray[np.bool_]

@@ -10,7 +10,7 @@ import pytest
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.method import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 

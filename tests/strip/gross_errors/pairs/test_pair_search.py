@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors.pairs import deletion, pair_search, screening
-from photostrip.strip.gross_errors.pairs.global_test import GlobalTest
+from photostrip.strip.gross_errors import pair_screening, pair_search
+from photostrip.strip.gross_errors.pair_search import GlobalTest
 from photostrip.strip.relative_orientation import robust, solution
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
 from tests.loops import nonempty
@@ -37,9 +37,11 @@ def spoiled(flown: TruePairs, errors: Floats) -> Pairs:
     return replace(flown.pairs, left=left)
 
 
-def examined(pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA) -> screening.ScreenedPairs:
+def examined(
+    pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA
+) -> pair_screening.ScreenedPairs:
     oriented, converged = orient_unchecked(pairs)
-    return screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
+    return pair_screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
 
 
 def level(seed: int, pairs: int, counts: tuple[int, ...] = (2, 2, 3, 3, 3, 3), sigma: float = SIGMA) -> TruePairs:
@@ -55,8 +57,8 @@ def test_a_gain_is_what_an_adjustment_without_the_points_loses(seed: int, n: int
     design, values = rng.normal(size=(n, 5)), rng.normal(size=n)
     matrix = np.eye(n) - design @ np.linalg.pinv(design)
     residual = matrix @ values
-    sets = deletion.subsets(n, k)
-    found = deletion.gains(residual[None], matrix[None], sets)[0]
+    sets = pair_search.subsets(n, k)
+    found = pair_search.gains(residual[None], matrix[None], sets)[0]
     for place in nonempty(rng.choice(len(sets), 5)):
         rest = np.setdiff1d(np.arange(n), sets[place])
         squares = np.linalg.lstsq(design[rest], values[rest], rcond=None)[1][0]
@@ -76,11 +78,11 @@ def test_the_search_finds_the_best_of_all_sets(seed: int, n: int, wrong: int) ->
     residual, basis = adjusted(np.random.default_rng(seed), n, wrong)
     target = np.array([chi2_quantile(0.9995, n - 5 - k) if n - k >= 6 else -np.inf for k in (1, 2, 3)])
     matrix = np.eye(n) - basis @ basis.transpose(0, 2, 1)
-    (found,) = deletion.search(residual, basis, target)
+    (found,) = pair_search.smallest_sets(residual, basis, target)
     total = float((residual**2).sum())
     for k in (1, 2, 3):
-        sets = deletion.subsets(n, k)
-        gain = deletion.gains(residual, matrix, sets)[0]
+        sets = pair_search.subsets(n, k)
+        gain = pair_search.gains(residual, matrix, sets)[0]
         if total - gain.max() <= target[k - 1]:
             assert found.tolist() == sets[gain.argmax()].tolist()
             return

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.statistics import grubbs_limit
-from photostrip.strip.gross_errors.pairs import screening
+from photostrip.strip.gross_errors import pair_screening
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, assess_pairs, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.relative_orientation.solution import solve_elements
@@ -33,7 +33,7 @@ ZONES = (2, 2, 3, 3, 3, 3)  # points of the six zones in the published experimen
 
 def screened(orientation: Orientation, settings: RelativeSettings, sigma: float) -> tuple[Orientation, Log]:
     """Reject points and give the pairs without them, and the log."""
-    found = screening.screen_pairs(orientation, settings, sigma)
+    found = pair_screening.screen_pairs(orientation, settings, sigma)
     return found.orientation, found.rejections
 
 
@@ -79,8 +79,8 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     expected, test = example.expected[f"parallax_then_{second}"], second.removeprefix("studentised_")
     oriented, names = of_example(example)
     rel = example.tol["values_rel"]
-    after, log = screening._stage(oriented, "parallax", example.input["T_mm"])
-    found, rest = screening._stage(after, test, example.input["alpha"])
+    after, log = pair_screening._stage(oriented, "parallax", example.input["T_mm"])
+    found, rest = pair_screening._stage(after, test, example.input["alpha"])
     log = [*log, *rest]
     rejected = [line for line in expected["log"] if line.get("rejected", True)]
     assert [(entry.test, names[entry.row]) for entry in log] == [(line["stage"], line["id"]) for line in rejected]
@@ -89,7 +89,7 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     compare(found, tuple(log), names, expected, example.tol)
     last = expected["log"][-1]
     if not last.get("rejected", True):  # the largest value of the last round stays below its limit
-        value, limit, _ = screening.tested(found, test, example.input["alpha"])
+        value, limit, _ = pair_screening.tested(found, test, example.input["alpha"])
         value[~found.used] = -np.inf
         assert names[int(value.argmax())] == last["id"]
         assert value.max() == pytest.approx(last["value"], rel=rel)
@@ -154,7 +154,7 @@ def test_the_shares_of_the_published_experiment(limit: float, published: dict[st
 @pytest.mark.parametrize(("method", "share"), [("grubbs", 0.025), ("tau", 0.052)])
 def test_false_alarms_of_clean_models(method: str, share: float) -> None:
     oriented, _ = experiment(2, 4000, errors=False)
-    value, limit, _ = screening.tested(oriented, method, 0.05)
+    value, limit, _ = pair_screening.tested(oriented, method, 0.05)
     alarms = np.maximum.reduceat(value > limit, oriented.pairs.starts).mean()
     assert alarms == pytest.approx(share, abs=4 * np.sqrt(share / 4000))
 

@@ -1,0 +1,582 @@
+"""What can be said about a project before anything is adjusted: ``photostrip check``.
+
+The faults of the files were found while they were read. Here is the rest: whether photos, pairs, strips and control
+have what an adjustment needs, what the ground frames make of a coordinate, which standard deviation each control
+coordinate gets and from where, and what became of every row of every table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.measured.control import ControlTable
+from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.measured.models import ModelTable
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.tables import Table
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import Document, Finding, Note, counted
+from photostrip.pipeline import overruling
+from photostrip.pipeline.image_coordinates import orient_interior
+from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, Strip, require_whole
+from photostrip.pipeline.plausibility import gate
+from photostrip.points import PhotoPoints, locate
+from photostrip.project.loading import Project, read_project
+from photostrip.project.tables import Tables, rays
+from photostrip.project.yaml.tree import fault_at, key_path
+from photostrip.strip.image_coordinates import corrections
+from photostrip.units import MICROMETRES, MILLIMETRES
+
+LEAST_SHARED = 4  # points that orient a photo
+LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
+IN_NO_STRIP = "its photo belongs to no strip"
+ONCE = "the point is measured on one photo only"
+NO_NEIGHBOUR = "the point is not on two neighbouring photos of one strip"
+IN_NO_MODEL = "its model belongs to no strip"
+NO_MODEL = "not measured in any model of the strips"
+OFF = "switched off (use: off)"
+NO_BUNDLE = "only the bundle adjustment uses it"
+NOT_MEASURED = "not measured on any photo of the strips"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found in one project."""
+
+    path: str
+    faults: tuple[Fault, ...]  # what must be put right before the project can be adjusted
+    findings: tuple[Finding, ...]
+    notes: tuple[Note, ...]
+    document: Document  # what was decoded: counts, rows, frames, control; empty when the files could not be read
+
+    @property
+    def everything(self) -> tuple[Fault | Finding | Note, ...]:
+        """Faults, then findings, then notes."""
+        return self.faults + self.findings + self.notes
+
+    @property
+    def wrong(self) -> int:
+        """How much must be put right: faults, and findings that stand against the whole result."""
+        return len(self.faults) + sum(each.is_error for each in self.findings)
+
+    @property
+    def remarks(self) -> int:
+        """How much else is reported."""
+        return len(self.everything) - self.wrong
+
+
+def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
+    """Check a project as far as that goes without adjusting it; nothing is raised for a faulty project."""
+    try:
+        project, tables = read_project(path, overrides)
+    except InputError as error:
+        return Checked(path=str(path), faults=error.faults, findings=error.findings, notes=(), document={})
+    inputs, models = project.inputs, project.inputs.models
+    faults = _refused(project, partial(overruling.require, project.settings.relative, inputs.observations))
+    if models is not None:
+        faults += _refused(project, partial(overruling.require_named, project.settings.links, models.points))
+    notes = list(project.hints)
+    notes += _image_coordinates(project, faults)
+    used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
+    faults += _neighbours(project) if models is None else links_of_models(project, models)
+    faults += [] if models is not None else _alone(project)
+    # strips of a block may hang on others, or on cameras
+    hung = len(inputs.strips) > 1 or inputs.positions is not None or inputs.orientations is not None
+    if project.settings.adjustment != BUNDLE and not (project.settings.together and models is None and hung):
+        faults += _control_of_strips(project, used)
+    frames = _frames(project, tables, faults)
+    if models is not None and (read := tables.models) is not None:
+        sigma = {"model_sigma": sigma_of(project, "models", (read.points, read.centers), models.points.sigma)}
+    else:
+        measured = (tables.observations,)
+        sigma = {"image_sigma": sigma_of(project, "observations", measured, inputs.observations.sigma)}
+    document: Document = {
+        "name": inputs.name,
+        "angle_unit": project.settings.angle_unit,
+        "counts": _counts(project, used),
+        **sigma,
+        "frames": frames,
+        "control": list(_control(project, tables)),
+        "rows": table_rows(project, tables, used),
+    }
+    counted = Findings()  # of too many faults in one file they only count the rest
+    counted.add(*dict.fromkeys(faults))
+    return Checked(
+        path=str(path),
+        faults=counted.faults,
+        findings=_against_themselves(project),
+        notes=tuple(notes),
+        document=document,
+    )
+
+
+def _against_themselves(project: Project) -> tuple[Finding, ...]:
+    """Let the gate look for what the data alone show, without an adjustment."""
+    try:
+        return project.placed(gate.of_inputs(project.inputs, project.settings, project.directory))
+    except (InputError, GeometryError):
+        return ()  # what is wrong is reported as a fault
+
+
+def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:
+    """Return what a test of the pipeline refuses, with its place in the project file."""
+    try:
+        with project.places():
+            test()
+    except InputError as error:
+        return list(error.faults)
+    return []
+
+
+def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
+    """Look at fiducial marks and distortion; what is refused there refuses the project."""
+    inputs, notes = project.inputs, []
+    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
+    try:
+        with project.places():
+            photo = orient_interior(inputs, project.settings)
+            notes = [] if photo.interior is None else list(photo.interior.notes)
+            # refraction and curvature need heights that only a run can find; they refuse nothing in a file
+            wanted = replace(project.settings.refinement, refraction=False, earth_radius=None)
+            corrections.refine(photo.observations, cameras, wanted)
+    except InputError as error:
+        faults += error.faults
+    except GeometryError as error:
+        faults.append(fault_at(project.tree, ("cameras",), str(error), error.code))
+    return notes
+
+
+def _common(strip: Strip, observations: PhotoPoints) -> list[Numbers]:
+    """Count the points that each photo of a strip has in common with the next, and with the next two."""
+    place, width = strip.positions(observations), len(strip.photos) + 2
+    key = np.unique((observations.point * width + place)[place >= 0])  # on the next photo it is larger by one
+    on_next = np.diff(key, append=-1) == 1
+    rows = on_next, on_next & np.append(on_next[1:], [False])
+    return [np.bincount(key[some] % width, minlength=width) for some in rows]
+
+
+def _neighbours(project: Project) -> list[Fault]:
+    """Refuse neighbouring photos that cannot be oriented, or whose models cannot be joined."""
+    common = [_common(strip, project.inputs.observations) for strip in project.inputs.strips]
+    of_two, of_three = zip(*common, strict=True) if common else ((), ())
+    return [*_pairs(project, of_two), *_junctions(project, of_three)]
+
+
+def _pairs(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
+    """Refuse neighbouring photos with too few common points for their relative orientation."""
+    from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
+
+    for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
+        for j in np.flatnonzero(count[: len(strip.photos) - 1] < MINIMUM_POINTS).tolist():
+            left, right = strip.photos[j : j + 2]
+            message = f"photos {left} and {right} have {counted(int(count[j]), 'point')} in common"
+            fix = "measure more, or correct the order of the photos"
+            expected = f"at least {MINIMUM_POINTS}, better 12"
+            path = ("strips", i, "photos", j + 1)
+            yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
+
+
+def _alone(project: Project) -> Iterator[Fault]:
+    """Refuse photos in no order that nothing orients: no orientation, too few points of control or other photos."""
+    inputs, seen = project.inputs, project.inputs.observations
+    given = () if inputs.orientations is None else inputs.orientations.photos
+    times = np.bincount(seen.point, minlength=len(seen.point_ids))
+    times[np.flatnonzero(locate(seen.point_ids, inputs.control.ids) >= 0)] += 1
+    shared = np.bincount(seen.photo[times[seen.point] > 1], minlength=len(seen.photo_ids))
+    counts = dict(zip(seen.photo_ids, shared.tolist(), strict=True))
+    for strip in inputs.strips:
+        if strip.listed or strip.id in given or counts[strip.id] >= LEAST_SHARED:
+            continue
+        number = counted(counts[strip.id], "point")
+        message = f"photo {strip.id} has {number} of the control or of other photos"
+        fix = "measure more, or give its orientation roughly (orientations, role: approximate)"
+        expected = f"at least {LEAST_SHARED}, better 12"
+        yield fault_at(project.tree, ("photos",), message, "photo-not-tied", expected=expected, fix=fix)
+
+
+def _junctions(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
+    """Refuse three photos in a row without a common point: nothing would carry the scale on."""
+    for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
+        for j in np.flatnonzero(count[: max(len(strip.photos) - 2, 0)] == 0).tolist():
+            names = strip.photos[j : j + 3]
+            message = f"no point is common to photos {', '.join(names[:2])} and {names[2]}: nothing carries the scale"
+            fix = "measure at least one pass point on all three"
+            yield fault_at(project.tree, ("strips", i, "photos", j + 1), message, "broken-joint", fix=fix)
+
+
+def _control_of_strips(project: Project, used: Numbers) -> Iterator[Fault]:
+    """Refuse strips with too little measured control for seven parameters."""
+    inputs = project.inputs
+    given = locate(inputs.control.ids, inputs.observations.point_ids)
+    for i, strip in enumerate(inputs.flights):
+        points = inputs.observations.point[used == i] if inputs.models is None else points_of_strip(inputs.models, i)
+        rows = np.isin(given, points) & ~inputs.control.check
+        plan, height = (int(inputs.control.use[rows, axis].sum()) for axis in (0, 2))
+        if plan >= LEAST_PLAN and height >= LEAST_HEIGHT:
+            continue
+        known = f"{counted(plan, 'control point')} in plan and {height} in height"
+        message = f"strip {strip.id} has {known} on neighbouring photos"
+        expected = f"at least {LEAST_PLAN} in plan and {LEAST_HEIGHT} in height, not on one line"
+        path = ("strips", i, "id")
+        fix = "measure more of the control on its photos"
+        yield fault_at(project.tree, path, message, "too-little-control", expected=expected, fix=fix)
+
+
+def _counts(project: Project, used: Numbers) -> Document:
+    inputs, measured = project.inputs, project.inputs.observations.point_ids
+    given, shown = inputs.control, locate(inputs.control.ids, measured) >= 0
+    return {
+        "files": len(project.files),
+        "strips": len(inputs.lines),
+        "in_no_order": sum(not strip.listed for strip in inputs.strips),
+        "photos": sum(len(strip.photos) for strip in inputs.flights),
+        **({} if inputs.models is None else counts_of_models(inputs.models)),
+        "image_points": len(inputs.observations),
+        "points": len(measured),
+        "new": len(measured) - int(shown.sum()),
+        "control_plan": int((given.use[:, 0] & ~given.check & shown).sum()),
+        "control_height": int((given.use[:, 2] & ~given.check & shown).sum()),
+        "check_plan": int((given.use[:, 0] & given.check & shown).sum()),
+        "check_height": int((given.use[:, 2] & given.check & shown).sum()),
+        "without_neighbour": len(gaps_of(inputs, used)) if inputs.models is None else 0,
+    }
+
+
+def _frames(project: Project, tables: Tables, faults: list[Fault]) -> list[Document]:
+    """Decode the frame of each control list at its first point, there and back."""
+    inputs = project.inputs
+    with project.places():
+        frames, output = tie_frames(inputs.frames, inputs.output, directory=project.directory)
+    faults += _refused(project, partial(require_whole, inputs, frames))
+    found = []
+    for number, frame in enumerate(frames):
+        read = tables.control[number]
+        rows = np.flatnonzero((inputs.control.frame == number) & inputs.control.use[:, :2].all(axis=1))
+        block: Document = {
+            "file": "" if read is None else read.table.file,
+            "frame": frame.describe(),
+            "kind": frame.kind,
+            "axes": list(frame.axes),
+            "is_output": frame is output,
+            "datum_accuracy": frame.datum_accuracy,
+        }
+        try:
+            block |= _decoded(project, frame, rows)
+        except (InputError, GeometryError) as error:
+            path = ("control", number, "crs")
+            texts = [fault.message for fault in error.faults] if isinstance(error, InputError) else [str(error)]
+            fix = "are the axes in the order of the columns, is the crs the right one?"
+            faults += [fault_at(project.tree, path, text, "ground-domain", fix=fix) for text in texts]
+        found.append(block)
+    if all(frame is not output for frame in frames):
+        found.append({"file": "", "frame": output.describe(), "kind": output.kind, "is_output": True})
+    return found
+
+
+def _decoded(project: Project, frame: GroundFrame, rows: Numbers) -> Document:
+    """One point to longitude, latitude, height and back; the size of the convergence over all points."""
+    control = project.inputs.control
+    if not len(rows):
+        return {}
+    enu = control.enu[rows].copy()
+    heights = enu[:, 2][~np.isnan(enu[:, 2])]
+    enu[np.isnan(enu[:, 2]), 2] = heights.mean() if len(heights) else 0.0
+    ids = [control.ids[row] for row in rows]
+    cartesian = frame.cartesian_from_ground(enu, ids=ids)
+    back = frame.ground_from_cartesian(cartesian[:1], ids=ids[:1])
+    centre = cartesian.mean(axis=0)
+    found: Document = {
+        "point": ids[0],
+        "given": frame.user_from_internal(control.enu[rows[0]]).tolist(),
+        "cartesian": cartesian[0].tolist(),
+        "back_mm": float(np.abs(frame.difference(back, enu[:1])).max() * MILLIMETRES),
+        "span_m": float(2.0 * np.linalg.norm(cartesian - centre, axis=1).max()),
+    }
+    if frame.kind != "local":
+        longitude, latitude, height = frame.geodetic(cartesian[:1])[0]
+        found["geodetic"] = [float(np.degrees(longitude)), float(np.degrees(latitude)), float(height)]
+    if frame.kind == "projected":
+        angles = np.degrees(frame.convergence(cartesian))
+        found["convergence_deg"] = [float(angles.min()), float(angles.max())]
+    return found
+
+
+def _control(project: Project, tables: Tables) -> Iterator[Document]:
+    """Return the standard deviation of every control coordinate, in the user's order, and where it comes from."""
+    if project.inputs.models is not None:
+        photos = {name: len(each) for name, each in photos_of_points(project.inputs.models).items()}
+    else:
+        measured = project.inputs.observations
+        count, total = len(measured.photo_ids), len(measured.point_ids)
+        times = np.bincount(np.unique(measured.point * count + measured.photo) // count, minlength=total)
+        photos = dict(zip(measured.point_ids, times.tolist(), strict=True))
+    for number, read in enumerate(tables.control):
+        if read is not None:
+            yield from _of_list(project, number, read, photos)
+
+
+def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str, int]) -> Iterator[Document]:
+    frame = project.inputs.frames[number]
+    given = project.tree.find("control", number, "sigma")
+    default: list[float | None] = (
+        [None] * 3 if given is None else [float(each.text) for each in given.elements] or [None] * 3
+    )
+    source = source_of(project, ("control", number, "sigma"))
+    columns = (read.check, read.table.lines, read.use, read.sigma, ~np.isnan(read.sigma))
+    for name, check, line, use, sigma, stated in zip(read.ids, *(each.tolist() for each in columns), strict=True):
+        here = {"source": "row", "file": read.table.file, "line": line, "key": ""}
+        of_axes = list(zip(sigma, stated, default, use, strict=True))
+        yield {
+            "id": name,
+            "role": "check" if check else "control",
+            "file": read.table.file,
+            "line": line,
+            "axes": list(frame.axes),
+            "counts": use,
+            "sigma": [(own if its else usual) if counts else None for own, its, usual, counts in of_axes],
+            "sigma_from": [(here if its else source) if counts else None for _, its, _, counts in of_axes],
+            "photos": photos.get(name, 0),
+        }
+
+
+def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:
+    """Refuse neighbouring models that cannot be linked, and models of the other hand."""
+    from photostrip.pipeline.strips.models import form_models  # strips of photos need none of it
+
+    for number, strip in enumerate(models.strips):
+        try:
+            form_models(strip, models.points, project.settings)
+        except GeometryError as error:
+            yield fault_at(project.tree, ("strips", number, "id"), str(error), error.code)
+        except np.linalg.LinAlgError as error:
+            message = (
+                f"neighbouring models of strip {strip.id} cannot be linked: their coordinates contradict each other"
+            )
+            yield fault_at(project.tree, ("strips", number, "id"), f"{message} ({error})", "singular")
+        except InputError as error:
+            for fault in error.faults:
+                words = {"expected": fault.expected, "fix": fault.fix}
+                yield fault_at(project.tree, ("models", "file"), fault.message, fault.code, **words)
+
+
+def source_of(project: Project, path: tuple[str | int, ...]) -> Document | None:
+    """Say where a value of the project stands: in which file, line and key; None when it is not given."""
+    if not project.tree.has(*path):
+        return None
+    place = project.tree.place_of(path)
+    return {"source": "default", "file": place.file, "line": place.line, "key": key_path(path)}
+
+
+def counts_of_models(models: MeasuredModels) -> Document:
+    """Count models, their points and their perspective centres."""
+    points = models.points.node < len(models.points.point_ids)
+    return {
+        "models": sum(len(strip.models) for strip in models.strips),
+        "model_points": int(points.sum()),
+        "model_centers": int((~points).sum()),
+    }
+
+
+def sigma_of(
+    project: Project, section: str, tables: Iterable[Measurements | ModelTable | None], sigma: Floats
+) -> Document:
+    """Say which standard deviations (mm) the measured coordinates get, and how many rows of the tables have some."""
+    read = [each for each in tables if each is not None]
+    rows = sum(len(each.table) for each in read)
+    stated = sum(int((~np.isnan(each.sigma).any(axis=1)).sum()) for each in read)
+    return {
+        "rows_with_own": stated,
+        "rows_with_default": rows - stated,
+        "default_from": source_of(project, (section, "sigma")),
+        "smallest_um": float((sigma * MICROMETRES).min()) if len(sigma) else None,
+        "largest_um": float((sigma * MICROMETRES).max()) if len(sigma) else None,
+    }
+
+
+def points_of_strip(models: MeasuredModels, number: int) -> Numbers:
+    """Points that the models of a strip hold, by number."""
+    points = models.points
+    known = set(models.strips[number].models)
+    inside = np.array([name in known for name in points.model_ids], bool)[points.model]
+    return np.unique(points.node[inside & (points.node < len(points.point_ids))])
+
+
+def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:
+    shown = {
+        name: strip.photos[place : place + 2] for strip in models.strips for place, name in enumerate(strip.models)
+    }
+    points = models.points
+    found = {name: set[str]() for name in points.point_ids}
+    for model, node in zip(points.model.tolist(), points.node.tolist(), strict=True):
+        if node < len(points.point_ids):
+            found[points.point_ids[node]].update(shown[points.model_ids[model]])
+    return found
+
+
+class Reason(NamedTuple):
+    """Why rows are not used, which of them, and whose they are."""
+
+    why: str
+    rows: Flags
+    ids: Sequence[str]
+    of_rows: Numbers  # which of the ids each row has
+
+
+def observations_used(inputs: Inputs) -> Numbers:
+    """Return the strip in which each image point takes part, shape (n,); -1 where no neighbouring photo shows it."""
+    observations = inputs.observations
+    places = {photo: (i, j) for i, strip in enumerate(inputs.strips) for j, photo in enumerate(strip.photos)}
+    strip, place = np.array([places[name] for name in observations.photo_ids], np.intp).reshape(-1, 2).T
+    strip, place = strip[observations.photo], place[observations.photo]
+    # a photo's number in one long row of all strips, with a gap between strips: neighbours differ by one
+    starts = np.cumsum([0, *(len(each.photos) + 1 for each in inputs.strips)])
+    position = starts[strip] + place
+    key = observations.point * (int(starts[-1]) + 1) + position
+    present = np.sort(key)
+
+    def shown(wanted: Numbers) -> Flags:
+        at = np.searchsorted(present, wanted)
+        return np.asarray(present[np.minimum(at, len(present) - 1)] == wanted)
+
+    if not len(key):
+        return np.zeros(0, np.intp)
+    return np.where(shown(key - 1) | shown(key + 1), strip, -1)
+
+
+def gaps_of(inputs: Inputs, used: Numbers) -> list[str]:
+    """Name the points measured on two photos or more, of which no two are neighbours in a strip.
+
+    used: what ``observations_used`` returns.
+    """
+    observations = inputs.observations
+    paired = np.zeros(len(observations.point_ids), bool)
+    paired[observations.point[used >= 0]] = True
+    free = tuple(strip.id for strip in inputs.strips if not strip.listed)
+    paired[observations.point[observations.places(free) >= 0]] = True  # neighbours are yet to be found
+    count = np.bincount(observations.point, minlength=len(observations.point_ids))
+    return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
+
+
+def table_rows(project: Project, tables: Tables, used: Numbers) -> list[Document]:
+    """Count what became of the rows of each table; used and unused rows add up to all rows.
+
+    The keys are ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line.
+    """
+    inputs = project.inputs
+    photos = {photo for strip in inputs.strips for photo in strip.photos}
+    if tables.models is not None and inputs.models is not None:
+        return model_rows(tables, inputs.models)
+    found = []
+    bundle = project.settings.together
+    apart = set() if bundle else set(gaps_of(inputs, used))  # a bundle takes points of any two photos
+    control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
+    count: dict[str, int] = {}
+    if tables.observations is not None:
+        count = rays(tables.observations, photos)
+        found += _measured(tables.observations, photos, count, apart, control if bundle else set())
+    if (marks := tables.fiducials) is not None:
+        reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
+        found += _blocks(marks.table, reasons, marks.times)
+    if bundle:  # and control of a single one
+        count = {name: max(number, 2) for name, number in count.items()}
+    found += [_given(read, count, apart) for read in tables.control if read is not None]
+    found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
+    return found
+
+
+def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
+    """Count what became of the rows of each table of a project of independent models, as ``table_rows``."""
+    found = []
+    known = set(models.points.model_ids)
+    read = tables.models
+    for each in () if read is None else (read.points, read.centers):
+        if each is not None:
+            reasons = [_outside(IN_NO_MODEL, each.model_ids, known, each.models)]
+            found.append(_block(each.table, reasons))
+    points = set(models.points.point_ids)
+    for control in tables.control:
+        if control is not None:
+            missing = _outside(NO_MODEL, control.ids, points)
+            off = missing._replace(why=OFF, rows=~control.used)
+            reasons = [off, missing._replace(rows=control.used & missing.rows)]
+            found.append(_block(control.table, reasons))
+    return found
+
+
+def _outside(why: str, ids: Sequence[str], known: set[str], of_rows: Numbers | None = None) -> Reason:
+    """Rows whose id is not known; without `of_rows` each row has an id of its own."""
+    of_rows = np.arange(len(ids)) if of_rows is None else of_rows
+    rows = np.array([name not in known for name in ids], bool)[of_rows]
+    return Reason(why=why, rows=rows, ids=ids, of_rows=of_rows)
+
+
+def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
+    outside = _outside(IN_NO_STRIP, read.ids, photos)
+    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(read.ids), bool)
+    reasons = [
+        outside,
+        outside._replace(why=OFF, rows=~outside.rows & off),
+        outside._replace(why=NO_BUNDLE, rows=~outside.rows & ~off & (not bundle)),
+    ]
+    return _block(read.table, reasons)
+
+
+def _measured(
+    read: Measurements, photos: set[str], count: dict[str, int], gaps: set[str], whole: set[str]
+) -> list[Document]:
+    """Sort the rows of measured points by what becomes of them."""
+    outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
+    once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
+    apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
+    ids: Document = {"ids": read.target_ids, "of_rows": read.target}
+    reasons = [
+        outside,
+        Reason(why=ONCE, rows=~outside.rows & once, **ids),
+        Reason(why=NO_NEIGHBOUR, rows=~outside.rows & ~once & apart, **ids),
+    ]
+    return _blocks(read.table, reasons, read.times)
+
+
+def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
+    number = np.array([count.get(name, 0) for name in read.ids], np.intp)
+    apart = np.array([name in gaps for name in read.ids], bool)
+    ids: Document = {"ids": read.ids, "of_rows": np.arange(len(read.ids))}
+    reasons = [
+        Reason(why=OFF, rows=~read.used, **ids),
+        Reason(why=NOT_MEASURED, rows=read.used & (number == 0), **ids),
+        Reason(why=ONCE, rows=read.used & (number == 1), **ids),
+        Reason(why=NO_NEIGHBOUR, rows=read.used & (number > 1) & apart, **ids),
+    ]
+    return _block(read.table, reasons)
+
+
+def _blocks(table: Table, reasons: list[Reason], times: Numbers) -> list[Document]:
+    """Count the rows of each file of a table; `times` says of how many rows of the file each of them is made."""
+    found = []
+    for file, inside in table.files:
+        of_file = [each._replace(rows=each.rows & inside) for each in reasons]
+        found.append(_block(table, of_file, np.where(inside, times, 0)) | {"file": file})
+    return found
+
+
+def _block(table: Table, reasons: list[Reason], times: Numbers | None = None) -> Document:
+    times = np.ones(len(table.lines), np.intp) if times is None else times
+    unused: list[Document] = []
+    for reason in reasons:
+        at = np.flatnonzero(reason.rows)
+        if len(at):
+            ids = list(dict.fromkeys(reason.ids[code] for code in reason.of_rows[at].tolist()))
+            line = int(table.lines[at[0]])
+            unused.append({"why": reason.why, "rows": int(times[at].sum()), "ids": ids, "first_line": line})
+    rows = int(times.sum())
+    return {"file": table.file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}
