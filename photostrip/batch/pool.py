@@ -126,7 +126,7 @@ class LocalPool:
 
     def __exit__(self, *_: object) -> None:
         """End all workers at once; they hold nothing that could be lost."""
-        self._pool.stop()
+        self._pool.stop()  # type: ignore[no-untyped-call]
         self._pool.join()
 
     def room(self) -> int:
