@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip import __version__
-from photostrip.batch.local_pool import Executor, LocalPool
+from photostrip.batch.pool import Executor, LocalPool
 from photostrip.batch.result_folder import ResultFolder, opened
 from photostrip.batch.run import Batch, Run, Stop, on_signals
 from photostrip.batch.selection import choose
-from photostrip.batch.tasks import Answer, Limits, Task
+from photostrip.batch.tasks import Answer, Limits
 from photostrip.cli.failures import as_fault, failures_as
 from photostrip.cli.stdout import BatchFormat, Document, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
@@ -64,7 +63,8 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
         trouble: list[PhotostripError] = []
         try:
             with executor_of(options, len(projects), table) as executor:
-                run.go(executor, BatchMessages(table, len(projects), quiet=quiet, verbose=verbose).finished, stop)
+                said = BatchMessages(table, len(projects), quiet=quiet, verbose=verbose)
+                run.go(executor, said.finished, stop, lambda task: table.begun(task.project))
         except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:
@@ -82,22 +82,13 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
     return code
 
 
-@contextmanager
-def executor_of(options: BatchOptions, number: int, table: BatchTable) -> Iterator[Executor]:
+def executor_of(options: BatchOptions, number: int, table: BatchTable) -> AbstractContextManager[Executor]:
     """Start the pool of this machine, or connect to the cluster that the user named."""
-    jobs = min(options.jobs or cores(), number)
-
-    def begun(task: Task) -> None:
-        table.begun(task.project)
-
     if options.executor == "local":
-        with LocalPool(jobs, options.limits, begun=begun) as pool:
-            yield pool
-        return
+        return LocalPool(min(options.jobs or cores(), number), options.limits)
     from photostrip.batch.cluster import cluster
 
-    with cluster(options.executor.removeprefix("dask:"), jobs, options.limits, begun, say=table.say) as found:
-        yield found
+    return cluster(options.executor.removeprefix("dask:"), options.limits, table.say)
 
 
 class BatchMessages:
