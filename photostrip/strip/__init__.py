@@ -14,3 +14,21 @@ independent models, ``model_strip`` chains them, the start of their network; ``r
 Source: [001] eq. 125-152; [004a] for the search in pairs; [Brown 1966], [Fraser 1997], [Kraus], [Saastamoinen 1972] for
 corrections; the rest is derived, docs/sources.md.
 """
+
+from __future__ import annotations
+
+from typing import Literal
+
+StepName = Literal[
+    "interior",
+    "refine",
+    "relative",
+    "intersection",
+    "chain",
+    "scale",
+    "strip",
+    "absolute",
+    "polynomial",
+    "resection",
+    "bundle",
+]  # that can be taken alone
