@@ -39,7 +39,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = None,
     form: Annotated[
         BatchFormat, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the summary is printed.")
-    ] = BatchFormat.TEXT,
+    ] = "text",
     width: Width = None,
     depfile: Rule = None,
     html: Annotated[

@@ -15,7 +15,7 @@ from photostrip.batch.run import Batch, Run, Stop, on_signals
 from photostrip.batch.selection import choose
 from photostrip.batch.tasks import Answer, Limits
 from photostrip.cli.failures import as_fault, failures_as
-from photostrip.cli.stdout import BatchFormat, Document, Format, ascii_only, print_sections
+from photostrip.cli.stdout import BatchFormat, Document, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
@@ -54,7 +54,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
     stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))
-        with failures_as(Format(form.value) if form.value in set(Format) else Format.TEXT):
+        with failures_as(form):
             projects = choose(options.projects)
             if options.output is not None:
                 folder = stack.enter_context(opened(options.output, options.overrides))
@@ -141,17 +141,17 @@ def print_summary(
     outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
     match form:
-        case BatchFormat.CSV:
+        case "csv":
             sys.stdout.write(visible(formats.summary_csv(outcomes)))
-        case BatchFormat.JSON:
+        case "json":
             sys.stdout.write(visible_json(formats.summary_json(outcomes, code, ascii_only=ascii_only())))
-        case BatchFormat.JUNIT:
+        case "junit":
             sys.stdout.write(batch_junit(outcomes))
-        case BatchFormat.GITHUB:
+        case "github":
             sys.stdout.write(messages.annotated(finding for each in outcomes for finding in each["findings"]))
-        case BatchFormat.TEXT | BatchFormat.MD:
+        case "text" | "md":
             sections = batch_sections(outcomes, quiet=quiet, everything=verbose)
-            markdown = form is BatchFormat.MD
+            markdown = form == "md"
             print_sections("Summary of the batch" if markdown else "", sections, width, markdown=markdown)
 
 
