@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from types import FrameType
 from typing import Any
 
-from photostrip.batch.local_pool import Executor
 from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
+from photostrip.batch.pool import Executor, answers, do_nothing
 from photostrip.batch.result_folder import ResultFolder
 from photostrip.batch.selection import ChosenProject
 from photostrip.batch.tasks import Answer, Task
@@ -88,9 +88,11 @@ class Run:
         self.force, self.strict, self.html = force, strict, html
         self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
 
-    def go(self, executor: Executor, listener: Listener, stop: Stop) -> Batch:
+    def go(
+        self, executor: Executor, listener: Listener, stop: Stop, begun: Callable[[Task], None] = do_nothing
+    ) -> Batch:
         """Compute what must be computed."""
-        for answer in executor.answers(self._tasks(listener, stop), stop):
+        for answer in answers(executor, self._tasks(listener, stop), stop, begun):
             self._write(answer, listener, stop)
         return self.batch
 

@@ -35,6 +35,22 @@ KINDS = {  # where the keys of each kind of file stand, and its title
             "cameras": "CamerasFile",
         }.items()
     },
+    **{
+        f"step {name}": ("steps", f"{kind}Keys", f"photostrip step {name}")
+        for name, kind in {
+            "interior": "Interior",
+            "refine": "Refine",
+            "relative": "Relative",
+            "intersection": "Intersection",
+            "chain": "Step",
+            "scale": "Step",
+            "strip": "Strip",
+            "absolute": "Absolute",
+            "polynomial": "Polynomial",
+            "resection": "Resection",
+            "bundle": "Bundle",
+        }.items()
+    },
 }
 MEASURED = {  # in a project
     "allOf": [

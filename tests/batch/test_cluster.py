@@ -25,7 +25,7 @@ from photostrip.batch.selection import choose
 from photostrip.batch.tasks import Limits, Task
 from photostrip.cli.main import main
 from photostrip.errors import InputError
-from tests.batch.faulty import WORK
+from tests.batch import faulty
 from tests.batch.projects import environment, run, tree, write_projects
 from tests.geodesy.frames import write_gtx
 
@@ -168,7 +168,7 @@ def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pyt
                 if len(count.times) == 3:
                     workers[0].send_signal(signal.SIGKILL)
 
-        with opened(Path("out")) as folder, clusters.cluster(address, 1, Limits()) as executor:
+        with opened(Path("out")) as folder, clusters.cluster(address, Limits()) as executor:
             batch = Run(choose(["strips"]), (), folder, force=False).go(executor, Killing().finished, Stop())
     assert workers[0].returncode == -signal.SIGKILL
     assert [each["status"] for each in batch.outcomes] == ["good"] * number  # nothing lost
@@ -192,7 +192,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
     monkeypatch.chdir(tmp_path)
     count = Count()
     limits = Limits(seconds=2.5, megabytes=500.0)
-    with clusters.cluster(cluster, 1, limits, work=WORK) as executor:
+    with clusters.cluster(cluster, limits, work=faulty.evaluate) as executor:
         Run(choose(["strips"]), (), None, force=False).go(executor, count.finished, Stop())
     assert count.statuses == {"segfault": "crashed", "hang": "timeout", "memory": "memory", "good": "good"}
 
@@ -269,9 +269,7 @@ def test_a_cluster_without_workers_is_waited_for_aloud(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("address", "message"),
     [
-        ("tcp://127.0.0.1:{port}", "no Dask scheduler answers at tcp://127.0.0.1:{port} (connection refused)"),
-        ("tcp://no-such-host.invalid:8786", "no Dask scheduler answers at tcp://no-such-host.invalid:8786"),
-        ("127.0.0.1:8786", "is not the address of a scheduler; expected dask:tcp://HOST:PORT or dask:local"),
+        ("tcp://127.0.0.1:{port}", "no Dask scheduler answers at tcp://127.0.0.1:{port}"),
         ("tcp://127.0.0.1:port", "no Dask scheduler answers at tcp://127.0.0.1:port"),
     ],
 )
@@ -291,7 +289,7 @@ def test_dask_is_asked_for_when_it_is_not_installed(
 ) -> None:
     write_projects(tmp_path, 1)
     monkeypatch.setitem(sys.modules, "dask", None)
-    assert main(["batch", str(tmp_path), "--executor", "dask:local"]) == 2
+    assert main(["batch", str(tmp_path), "--executor", "dask:tcp://127.0.0.1:1"]) == 2
     assert "Dask is not installed; pip install 'photostrip[dask]'" in capsys.readouterr().err
 
 

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip import __version__
-from photostrip.batch.local_pool import Executor, LocalPool
+from photostrip.batch.pool import Executor, LocalPool
 from photostrip.batch.result_folder import ResultFolder, opened
 from photostrip.batch.run import Batch, Run, Stop, on_signals
 from photostrip.batch.selection import choose
-from photostrip.batch.tasks import Answer, Limits, Task
+from photostrip.batch.tasks import Answer, Limits
 from photostrip.cli.failures import as_fault, failures_as
-from photostrip.cli.stdout import BatchFormat, Document, Format, ascii_only, print_sections
+from photostrip.cli.stdout import BatchFormat, Document, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
@@ -55,7 +54,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
     stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))
-        with failures_as(Format(form.value) if form.value in set(Format) else Format.TEXT):
+        with failures_as(form):
             projects = choose(options.projects)
             if options.output is not None:
                 folder = stack.enter_context(opened(options.output, options.overrides))
@@ -64,7 +63,8 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
         trouble: list[PhotostripError] = []
         try:
             with executor_of(options, len(projects), table) as executor:
-                run.go(executor, BatchMessages(table, len(projects), quiet=quiet, verbose=verbose).finished, stop)
+                said = BatchMessages(table, len(projects), quiet=quiet, verbose=verbose)
+                run.go(executor, said.finished, stop, lambda task: table.begun(task.project))
         except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:
@@ -82,22 +82,13 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
     return code
 
 
-@contextmanager
-def executor_of(options: BatchOptions, number: int, table: BatchTable) -> Iterator[Executor]:
+def executor_of(options: BatchOptions, number: int, table: BatchTable) -> AbstractContextManager[Executor]:
     """Start the pool of this machine, or connect to the cluster that the user named."""
-    jobs = min(options.jobs or cores(), number)
-
-    def begun(task: Task) -> None:
-        table.begun(task.project)
-
     if options.executor == "local":
-        with LocalPool(jobs, options.limits, begun=begun) as pool:
-            yield pool
-        return
+        return LocalPool(min(options.jobs or cores(), number), options.limits)
     from photostrip.batch.cluster import cluster
 
-    with cluster(options.executor.removeprefix("dask:"), jobs, options.limits, begun, say=table.say) as found:
-        yield found
+    return cluster(options.executor.removeprefix("dask:"), options.limits, table.say)
 
 
 class BatchMessages:
@@ -150,17 +141,17 @@ def print_summary(
     outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
     match form:
-        case BatchFormat.CSV:
+        case "csv":
             sys.stdout.write(visible(formats.summary_csv(outcomes)))
-        case BatchFormat.JSON:
+        case "json":
             sys.stdout.write(visible_json(formats.summary_json(outcomes, code, ascii_only=ascii_only())))
-        case BatchFormat.JUNIT:
+        case "junit":
             sys.stdout.write(batch_junit(outcomes))
-        case BatchFormat.GITHUB:
+        case "github":
             sys.stdout.write(messages.annotated(finding for each in outcomes for finding in each["findings"]))
-        case BatchFormat.TEXT | BatchFormat.MD:
+        case "text" | "md":
             sections = batch_sections(outcomes, quiet=quiet, everything=verbose)
-            markdown = form is BatchFormat.MD
+            markdown = form == "md"
             print_sections("Summary of the batch" if markdown else "", sections, width, markdown=markdown)
 
 

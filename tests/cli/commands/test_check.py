@@ -95,12 +95,6 @@ def test_no_line_of_the_tables_is_wider_than_the_page(
     assert max(map(len, tables)) <= width
 
 
-def test_markdown(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = call(capsys, "check", project, "--format", "md")
-    assert out.startswith(f"# {project}: OK")
-    assert "## Contents" in out
-
-
 # -------------------------------------------------------------------------------- weak geometry, before it is met
 
 
@@ -144,13 +138,6 @@ def test_very_many_faults_are_only_counted(tmp_path: Path) -> None:
     faults = check_project(tmp_path / "project.yaml").faults
     assert len(faults) == 201
     assert faults[-1].code == "more"
-
-
-def test_what_check_refuses_run_refuses_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = small(tmp_path).folder / "project.yaml"
-    code, _, err = call(capsys, "run", path)
-    assert code == 3
-    assert "common points" in err
 
 
 # --------------------------------------------------------------------------------------------- decoded frames
@@ -277,14 +264,6 @@ def test_every_row_is_accounted_for(tmp_path: Path) -> None:
         ("switched off (use: off)", ["N1"], 3),
         ("not measured on any photo of the strips", ["N2"], 4),
     ]
-
-
-def test_a_near_miss_of_a_name_is_suggested(tmp_path: Path) -> None:
-    made = small(tmp_path)
-    made.change("control.csv", "G1,", "G-1 ,")
-    notes = {note.code: note for note in check_project(tmp_path / "project.yaml").notes}
-    assert "`G-1`, did you mean `G1`?" in notes["control-not-measured"].message
-    assert (notes["control-not-measured"].line, notes["stray-blanks"].line) == (2, 2)
 
 
 # ------------------------------------------------------------------------------------- the same in every format
