@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from pyproj import Proj
 
 from photostrip.camera import Camera, Distortion
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints

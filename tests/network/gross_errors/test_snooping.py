@@ -10,8 +10,8 @@ import pytest
 
 from photostrip.network import snooping, strip_rays
 from photostrip.network.adjustment import Selection
+from photostrip.network.problem import BundleSettings
 from photostrip.network.reliability import groups_of
-from photostrip.network.settings import BundleSettings
 from photostrip.rejection import UNCONTROLLED
 from photostrip.simulation import Flight, Points, Spec
 from photostrip.statistics import normal_quantile

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.strip.gross_errors import control_search
-from photostrip.strip.independent_models.linking import LinkSettings
+from photostrip.strip import control_search
+from photostrip.strip.model_links import LinkSettings
 from tests.loops import nonempty
 from tests.models import inputs, truth
 from tests.simulated import inputs_of

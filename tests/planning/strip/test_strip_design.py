@@ -32,7 +32,7 @@ from photostrip.planning.strip_design import (
     worst,
 )
 from photostrip.simulation import FILM, Points
-from photostrip.strip.gross_errors.pair_screening import DETECTABLE
+from photostrip.strip.pair_screening import DETECTABLE
 from tests.loops import nonempty
 from tests.planning.strip.repeated import scatter
 

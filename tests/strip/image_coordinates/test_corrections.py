@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import corrections, lens_distortion
-from photostrip.strip.image_coordinates.corrections import (
+from photostrip.strip import corrections, lens_distortion
+from photostrip.strip.corrections import (
     Bending,
     ImageCorrectionSettings,
     Refined,

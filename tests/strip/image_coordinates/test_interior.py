@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import interior
-from photostrip.strip.image_coordinates.corrections import InteriorSettings
-from photostrip.strip.image_coordinates.interior import InteriorOrientation, linear_shape
+from photostrip.strip import interior
+from photostrip.strip.corrections import InteriorSettings
+from photostrip.strip.interior import InteriorOrientation, linear_shape
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

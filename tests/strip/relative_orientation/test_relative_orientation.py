@@ -18,6 +18,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.strip.fitted_strip import image_variance
+from photostrip.strip.intersection import intersect
 from photostrip.strip.relative_orientation.orientation import (
     assess_pairs,
     orient_pairs,
@@ -34,7 +35,6 @@ from photostrip.strip.relative_orientation.solution import (
     start_values,
     y_parallaxes,
 )
-from photostrip.strip.strip_formation.intersection import intersect
 from tests.strips import (
     MICROMETRE,
     Flown,

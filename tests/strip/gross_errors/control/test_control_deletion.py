@@ -19,16 +19,16 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.strip.absolute_orientation import Targets
+from photostrip.strip.control_screening import FoundErrors, reliability
+from photostrip.strip.control_search import StripAtControl, adjust
 from photostrip.strip.fitted_strip import Misclosures
-from photostrip.strip.gross_errors.control_screening import FoundErrors, reliability
-from photostrip.strip.gross_errors.control_search import StripAtControl, adjust
 from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline.results import Result
-    from photostrip.strip.gross_errors.control_search import JointAdjustment
+    from photostrip.strip.control_search import JointAdjustment
     from tests.strips import Flown
 
     Flags = NDArray[np.bool_]

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors import pair_screening, pair_search
-from photostrip.strip.gross_errors.pair_search import GlobalTest
-from photostrip.strip.relative_orientation import robust, solution
+from photostrip.strip import pair_screening, pair_search, robust
+from photostrip.strip.pair_search import GlobalTest
+from photostrip.strip.relative_orientation import solution
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, TruePairs, batch, true_pairs

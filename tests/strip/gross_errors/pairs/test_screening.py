@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.statistics import grubbs_limit
-from photostrip.strip.gross_errors import pair_screening
+from photostrip.strip import pair_screening
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, assess_pairs, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.relative_orientation.solution import solve_elements
