@@ -390,7 +390,8 @@ class FactoredEquations:
         """Say what the misfits would lose by causes that nothing has been asked about."""
         equations, at = self.equations, self.equations.linearised
         problem, k, p = equations.prepared.problem, columns.rays.shape[2], len(equations.right_common)
-        m, q, of_rays, (rays,) = problem.photos, problem.points, columns.rays.reshape(-1, k), np.nonzero(columns.among)
+        m, q, (rays,) = problem.photos, problem.points, np.nonzero(columns.among)
+        of_rays = columns.rays.reshape(columns.rays.shape[0] * columns.rays.shape[1], k)  # k may be 0
         photos = _blocks(at.rays.by_photo[rays], problem.images.photo[rays], m).T @ of_rays
         points = _blocks(at.rays.by_point[rays], problem.images.point[rays], q).T @ of_rays
         np.add.at(points.reshape(q, 3, k), problem.control.point, at.by_controlled.swapaxes(1, 2) @ columns.control)
@@ -401,7 +402,9 @@ class FactoredEquations:
         pull = of_rays.T @ at.rays.misfit[rays].ravel() + np.einsum("nik,ni->k", columns.control, at.control)
         if len(at.positions.photo):
             by_photo, by_common, off = at.positions.scaled()
-            np.add.at(photos.reshape(m, -1, k), at.positions.photo, by_photo.swapaxes(1, 2) @ columns.positions)
+            np.add.at(
+                photos.reshape(m, problem.unknowns, k), at.positions.photo, by_photo.swapaxes(1, 2) @ columns.positions
+            )
             common += np.einsum("nip,nik->pk", by_common, columns.positions)
             squares += np.einsum("nik,nil->kl", columns.positions, columns.positions)
             pull += np.einsum("nik,ni->k", columns.positions, off)
