@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 MICROMETRE = 1e-6  # m
 NANORADIAN = 1e-9
 WGS84 = {"a": 6378137.0, "flattening": 1.0 / 298.257223563}
-US_FOOT = 1200.0 / 3937.0
 UTM33 = frame("EPSG:32633")
 
 # crs, west, east, south, north: where each of these is in use
@@ -135,15 +134,6 @@ def test_convergence_has_the_sign_of_the_textbooks() -> None:
 
 
 # ------------------------------------------------------------------------------- units, bodies, differences
-
-
-def test_feet_in_plan_and_metres_in_height() -> None:
-    grid = frame("EPSG:2263")  # 300 000 m are 984 250 feet at the origin 40 10' N, 74 W
-    assert (grid.plan_unit, grid.height_unit) == ("US survey foot", "metre")
-    xyz = cartesian(grid, np.array([-74.0, 40.0 + 10.0 / 60.0, 12.0]))
-    assert grid.ground_from_cartesian(xyz)[0] == pytest.approx((300000.0 / US_FOOT, 0.0, 12.0), abs=1e-5)
-    a, b = np.array([[984250.0, 100.0, 12.0]]), np.array([[984249.0, 97.0, 10.0]])
-    assert grid.difference(a, b)[0] == pytest.approx((US_FOOT, 3.0 * US_FOOT, 2.0))
 
 
 @given(
