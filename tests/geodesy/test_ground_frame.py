@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Proj, Transformer
 
-from photostrip.errors import InputError
+from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from tests.geodesy.frames import frame, krueger, spec
 
@@ -201,3 +201,16 @@ def test_longitudes_and_latitudes_that_do_not_exist(point: tuple[float, ...]) ->
         InputError, match=r"^row 0: no such longitude and latitude \(are the axes in the right order\?\)$"
     ):
         frame("EPSG:4979").cartesian_from_ground([point])
+
+
+def test_a_polar_grid_works_at_its_pole() -> None:
+    for crs, normal in (("EPSG:3031", -1.0), ("EPSG:5041", 1.0), ("EPSG:32661", 1.0)):
+        grid = FRAMES[crs]
+        xyz = cartesian(grid, np.array([0.0, normal * 90.0, 100.0]))
+        axes = grid.axes_at(xyz)[0]
+        assert axes[2] == pytest.approx((0.0, 0.0, normal), abs=NANORADIAN)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        enu = grid.ground_from_cartesian(xyz)
+        assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
+        with pytest.raises(GeometryError, match="row 0: at a pole there is no east and no north"):
+            grid.convergence(xyz)
