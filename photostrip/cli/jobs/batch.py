@@ -22,7 +22,7 @@ from photostrip.formats.text.writing import make_rule, write_files, write_text
 from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
-from photostrip.report.page.progress import BatchTable, batch_table
+from photostrip.report.page.progress import BatchProgress, batch_progress
 from photostrip.visible import visible, visible_json
 
 EXIT_SIGNAL = 128  # plus its number, as a shell reports it
@@ -58,17 +58,17 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
             projects = choose(options.projects)
             if options.output is not None:
                 folder = stack.enter_context(opened(options.output, options.overrides))
-        table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
+        progress = stack.enter_context(batch_progress(sys.stderr, len(projects), quiet=quiet))
         run = Run(projects, options.overrides, folder, force=options.force, strict=options.strict, html=options.html)
         trouble: list[PhotostripError] = []
         try:
-            with executor_of(options, len(projects), table) as executor:
-                said = BatchMessages(table, len(projects), quiet=quiet, verbose=verbose)
-                run.go(executor, said.finished, stop, lambda task: table.begun(task.project))
+            with executor_of(options, len(projects), progress) as executor:
+                said = BatchMessages(progress, len(projects), quiet=quiet, verbose=verbose)
+                run.go(executor, said.finished, stop, lambda task: progress.begun(task.project))
         except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:
-            table.stop()
+            progress.stop()
             code = max((run.batch.exit_code, *(each.exit_code for each in trouble)))
             code = EXIT_SIGNAL + stop.signal if stop.signal else code
             if folder is not None:
@@ -82,13 +82,13 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
     return code
 
 
-def executor_of(options: BatchOptions, number: int, table: BatchTable) -> AbstractContextManager[Executor]:
+def executor_of(options: BatchOptions, number: int, progress: BatchProgress) -> AbstractContextManager[Executor]:
     """Start the pool of this machine, or connect to the cluster that the user named."""
     if options.executor == "local":
         return LocalPool(min(options.jobs or cores(), number), options.limits)
     from photostrip.batch.cluster import cluster
 
-    return cluster(options.executor.removeprefix("dask:"), options.limits, table.say)
+    return cluster(options.executor.removeprefix("dask:"), options.limits, progress.say)
 
 
 class BatchMessages:
@@ -97,19 +97,19 @@ class BatchMessages:
     Verbose messages say also where internal errors happened.
     """
 
-    def __init__(self, table: BatchTable, total: int, *, quiet: bool, verbose: bool) -> None:
-        self.table, self.total, self.quiet, self.verbose, self.done = table, total, quiet, verbose, 0
+    def __init__(self, progress: BatchProgress, total: int, *, quiet: bool, verbose: bool) -> None:
+        self.progress, self.total, self.quiet, self.verbose, self.done = progress, total, quiet, verbose, 0
 
     def finished(self, outcome: Document, answer: Answer | None) -> None:
         """Say what became of a project."""
         self.done += 1
-        self.table.finished(outcome["project"], failed=bool(outcome["exit_code"]), unchanged=answer is None)
-        if self.quiet or (self.table.live and not outcome["exit_code"]):
+        self.progress.finished(outcome["project"])
+        if self.quiet or (self.progress.live and not outcome["exit_code"]):
             return
         how = ", unchanged" if answer is None and not outcome["exit_code"] else ""
         trace = answer.trace if answer is not None and self.verbose else ""
         count = f"{self.done:>{len(str(self.total))}} of {self.total}"
-        self.table.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
+        self.progress.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
 
 
 def write_summaries(batch: Batch, code: int, folder: ResultFolder, *, html: bool = False) -> list[InputError]:
