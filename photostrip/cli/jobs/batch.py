@@ -11,7 +11,7 @@ from pathlib import Path
 from photostrip import __version__
 from photostrip.batch.pool import Executor, LocalPool
 from photostrip.batch.result_folder import ResultFolder, opened
-from photostrip.batch.run import Batch, Run, Stop, on_signals
+from photostrip.batch.run import Run, Stop, on_signals
 from photostrip.batch.selection import choose
 from photostrip.batch.tasks import Answer, Limits
 from photostrip.cli.failures import as_fault, failures_as
@@ -69,14 +69,14 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
             trouble.append(error)
         finally:
             progress.stop()
-            code = max((run.batch.exit_code, *(each.exit_code for each in trouble)))
+            code = max((run.exit_code, *(each.exit_code for each in trouble)))
             code = EXIT_SIGNAL + stop.signal if stop.signal else code
             if folder is not None:
-                trouble += write_summaries(run.batch, code, folder, html=options.html)
-    print_summary(run.batch.outcomes, code, form, width, quiet=quiet, verbose=verbose)
+                trouble += write_summaries(run, code, folder, html=options.html)
+    print_summary(run.outcomes, code, form, width, quiet=quiet, verbose=verbose)
     if options.depfile is not None and options.output is not None:
         write_text(options.depfile, make_rule(options.output / "summary.json", run.files_read()))
-    _say_end(run.batch, stop, quiet=quiet)
+    _say_end(run, stop, quiet=quiet)
     for each in trouble:
         raise each
     return code
@@ -112,22 +112,22 @@ class BatchMessages:
         self.progress.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
 
 
-def write_summaries(batch: Batch, code: int, folder: ResultFolder, *, html: bool = False) -> list[InputError]:
+def write_summaries(run: Run, code: int, folder: ResultFolder, *, html: bool = False) -> list[InputError]:
     """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
     pages = {}
     if html:
         from photostrip.report.html import batch_html
 
-        pages["summary.html"] = batch_html(batch.outcomes, __version__)
+        pages["summary.html"] = batch_html(run.outcomes, __version__)
     try:
         write_files(
             folder.path,
             {
-                "summary.txt": text.to_text("", batch_sections(batch.outcomes, everything=True)),
-                "summary.csv": formats.summary_csv(batch.outcomes),
+                "summary.txt": text.to_text("", batch_sections(run.outcomes, everything=True)),
+                "summary.csv": formats.summary_csv(run.outcomes),
                 **pages,
-                "junit.xml": batch_junit(batch.outcomes),
-                "summary.json": formats.summary_json(batch.outcomes, code),
+                "junit.xml": batch_junit(run.outcomes),
+                "summary.json": formats.summary_json(run.outcomes, code),
             },
         )
     except InputError as error:
@@ -155,15 +155,15 @@ def print_summary(
             print_sections("Summary of the batch" if markdown else "", sections, width, markdown=markdown)
 
 
-def _say_end(batch: Batch, stop: Stop, *, quiet: bool) -> None:
+def _say_end(run: Run, stop: Stop, *, quiet: bool) -> None:
     """Say on stderr what was computed, and why the batch ended before its end."""
-    waiting = sum(each["status"] == "not run" for each in batch.outcomes)
+    waiting = sum(each["status"] == "not run" for each in run.outcomes)
     if stop.signal:
         sys.stderr.write(f"interrupted: {counted(waiting, 'project')} not run; the same command goes on from here\n")
     elif stop():
         sys.stderr.write(
             f"error: {stop.refusals} results in a row could not be written; {counted(waiting, 'project')} not run\n"
         )
-    elif not quiet and batch.unchanged:
-        computed = len(batch.outcomes) - batch.unchanged
-        sys.stderr.write(f"{computed} computed, {batch.unchanged} unchanged since the last time\n")
+    elif not quiet and run.unchanged:
+        computed = len(run.outcomes) - run.unchanged
+        sys.stderr.write(f"{computed} computed, {run.unchanged} unchanged since the last time\n")
