@@ -18,7 +18,7 @@ from photostrip.geometry.rotation import angles, from_alpha_omega_kappa
 from photostrip.library.step_arguments import Rays, of_rays, sigma0_of
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip, one_pair
 from photostrip.report.page.parts import DASH, Facts
-from photostrip.result.trace.replay import first_rounds
+from photostrip.sheets.replay import first_rounds
 from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
 from photostrip.strip.image_coordinates.corrections import Bending, undistort
 from photostrip.strip.polynomial_terms import columns as design_columns

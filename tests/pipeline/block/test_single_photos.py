@@ -14,8 +14,8 @@ from photostrip.points import PhotoPoints
 from photostrip.report.html import to_html
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
-from photostrip.result.trace.trace import trace_of
 from photostrip.result.verdict import verdict_of
+from photostrip.sheets.trace import trace_sheet
 from photostrip.simulation import Control, Flight, Ground, Simulation, Spec
 from tests.pipeline.blocks import adjusted, errors, exact, orientations, simulate
 from tests.results import result_files
@@ -56,7 +56,7 @@ def test_every_output_knows_single_photos() -> None:
         assert "Relative orientation" not in titles
     assert to_html(document).count("<svg") >= 2
     assert set(result_files(document)) > {"points.csv", "photos.csv", "reliability.csv"}
-    assert trace_of(result)["strips"] == []
+    assert "absolute" not in trace_sheet(result).document()
     assert compare_results(document, document)["status"] == "same"
 
 
