@@ -14,10 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
 from photostrip.pipeline.inputs import Settings
-from photostrip.report.commands.trace import _left_over, trace_sections, trace_title
-from photostrip.report.page.text import to_text
-from photostrip.result.trace.departures import CHOICES, departures_of
-from photostrip.result.trace.trace import SYMBOLS, trace_of
+from photostrip.sheets.trace import CHOICES, MATRIX, SYMBOLS, departures_of, trace_sheet
 from photostrip.simulation.spec import GrossError
 from photostrip.strip.polynomial import PolynomialSettings
 from tests.loops import nonempty
@@ -26,6 +23,7 @@ from tests.results import solved as solve
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from tests.results import Case
@@ -47,8 +45,64 @@ def solved(name: str) -> Case:
 
 @cache
 def trace(name: str) -> Document:
-    found: Document = json.loads(json.dumps(trace_of(solved(name).result)))
-    return found
+    return by_stage(json.loads(trace_sheet(solved(name).result).rendered("json")))
+
+
+def values(row: Document, *names: str) -> list[Any]:
+    return [row[name] for name in names]
+
+
+def by_stage(tables: Document) -> Document:
+    """Put the tables of a trace together by strip, pair and junction."""
+    strips = []
+    for absolute in tables["absolute"]:
+
+        def of(key: str, strip: str = absolute["strip"]) -> list[Document]:
+            return [row for row in tables.get(key, ()) if row["strip"] == strip]
+
+        chain = [
+            row | {"A": values(row, *MATRIX), "S": values(row, "Xs", "Ys", "Zs"), "B": values(row, "BX", "BY", "BZ")}
+            for row in of("chain")
+        ]
+        junctions = [
+            row | {"points": [each for each in of("junction_points") if each["photo"] == row["photo"]]}
+            for row in of("junctions")
+        ]
+        *steps, end = of("similarity_steps")
+        control = []
+        for row in of("similarity_control"):
+            given = values(row, "given_X", "given_Y", "given_Z")
+            oriented = [at + left for at, left in zip(given, values(row, "vX", "vY", "vZ"), strict=True)]
+            control.append(row | {"strip": values(row, "X", "Y", "Z"), "given": given, "oriented": oriented})
+        (approximate,) = of("approximate")
+        approximate["centroid"] = values(approximate, "centroid_x", "centroid_y", "centroid_z")
+        found = absolute | {
+            **{name: end[name] for name in ("s", "xi", "eta", "theta")},
+            "shift": values(end, "X0", "Y0", "Z0"),
+            "M": values(absolute, *(f"M_{place}" for place in MATRIX)),
+            "steps": steps,
+            "control": control,
+            "approximate": approximate | {"pairs": of("control_distances")},
+        }
+        pairs = [_pair(row, of) for row in of("pairs")]
+        strips.append({"pairs": pairs, "chain": chain, "scale_transfer": junctions, "absolute": found})
+    return tables | {"strips": strips}
+
+
+def _pair(row: Document, of: Callable[[str], list[Document]]) -> Document:
+    def own(key: str) -> list[Document]:
+        return [each for each in of(key) if values(each, "left", "right") == values(row, "left", "right")]
+
+    rounds = []
+    for number in sorted({each["round"] for each in own("pair_steps")}):
+        states = [
+            each | {"elements": {e: each[e] for e in ELEMENTS}, "d": {e: each[f"d_{e}"] for e in ELEMENTS}}
+            for each in own("pair_steps")
+            if each["round"] == number
+        ]
+        rounds.append({"points": states[0]["points"], "steps": states[:-1], "end": states[-1]["elements"]})
+    whole = {"elements": {e: row[e] for e in ELEMENTS}, "photo_system": row, "rounds": rounds}
+    return row | whole | {"rejected": own("pair_rejected"), "points": own("pair_points")}
 
 
 def rotation(alpha: float, omega: float, kappa: float) -> Rotation:
@@ -171,29 +225,24 @@ def test_the_similarity_brings_the_strip_to_the_control(name: str) -> None:
 
 def test_polynomials_take_out_the_free_terms() -> None:
     settings = Settings("polynomial", polynomial=PolynomialSettings("2"))
-    found = json.loads(json.dumps(trace_of(solve(case("projected").inputs, settings).result)))["strips"][0][
-        "polynomial"
-    ]
-    assert found["degree"] == 2
+    found = json.loads(trace_sheet(solve(case("projected").inputs, settings).result).rendered("json"))
+    assert {row["found"] for row in found["polynomial_evidence"]} == {2}
     powers = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
-    for row in nonempty(found["control"]):
-        for number, axis in enumerate("XYZ"):
-            fit = found["axes"][axis]
+    for row in nonempty(found["polynomial_control"]):
+        for axis in "XYZ":
             value = sum(
-                coefficient * row["X"] ** powers[term][0] * row["Y"] ** powers[term][1]
-                for term, coefficient in zip(fit["terms"], fit["coefficients"], strict=True)
+                each["coefficient"] * row["X"] ** powers[each["term"]][0] * row["Y"] ** powers[each["term"]][1]
+                for each in found["polynomial_terms"]
+                if each["axis"] == axis
             )
-            assert row["v"][number] == pytest.approx(value - row["l"][number], abs=3e-4)  # eq. 151
+            assert row[f"v{axis}"] == pytest.approx(value - row[f"l{axis}"], abs=3e-4)  # eq. 151
 
 
-def test_a_trace_is_the_same_every_time() -> None:
-    assert trace_of(solved("projected").result) == trace_of(solved("projected").result)
-
-
-def test_every_symbol_is_explained() -> None:
-    page = to_text(trace_title(trace("gross error")), trace_sections(trace("gross error")), 200)
+def test_a_trace_is_the_same_every_time_and_explains_its_symbols() -> None:
+    pages = [trace_sheet(solved("gross error").result).rendered("text", 200) for _ in range(2)]
+    assert pages[0] == pages[1]
     for symbol in ("[wqq]", "[wvv]", "A0", "k_t", "α1′", "τ"):
-        assert symbol in page
+        assert symbol in pages[0]
     assert {"q", "N", "k", "[wqq]", "[wvv]"} <= {name.split(",")[0] for name in SYMBOLS}
 
 
@@ -207,7 +256,7 @@ def test_the_preset_for_teaching_gives_a_trace_in_gon(tmp_path: Path, ending: st
     if ending == "json":
         document = json.loads(text)
         assert document["angles"] == "gon"
-        joint = document["strips"][0]["scale_transfer"][0]
+        joint = by_stage(document)["strips"][0]["scale_transfer"][0]
         used = [point["k_t"] for point in joint["points"] if point["used"]]
         assert joint["k"] == pytest.approx(sum(used) / len(used), abs=1e-8)  # the textbook's mean
     else:
@@ -234,8 +283,7 @@ def as_printed(folder: Path, *options: str) -> Document:
     project.write_text(text.replace("observations:", FIRST + "observations:", 1), encoding="utf-8")
     file = folder / "trace.json"
     assert main(["run", str(project), "--quiet", "--trace", str(file), *options]) in {0, 1}
-    found: Document = json.loads(file.read_text(encoding="utf-8"))
-    return found
+    return by_stage(json.loads(file.read_text(encoding="utf-8")))
 
 
 @pytest.mark.slow
@@ -244,8 +292,8 @@ def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: pytest
     document = as_printed(tmp_path)
     assert document["departures"] == []
     usual = departures_of(Settings())
-    assert [row["subject"] for row in usual] == [choice.subject for choice in CHOICES]
-    assert "processing.intersection: left" in [row["key"] for row in usual]
+    assert [subject for subject, *_ in usual] == [choice.subject for choice in CHOICES]
+    assert "processing.intersection: left" in [key for *_, key in usual]
     strip = document["strips"][0]
     first = strip["chain"][0]
     angles = [first[name] for name in ("alpha", "omega", "kappa")]
@@ -303,16 +351,3 @@ def test_scales_of_pairs_of_control_points(name: str) -> None:
     assert approximate["centroid"] == pytest.approx(
         np.mean([row["strip"] for row in control.values()], axis=0), abs=1e-8
     )
-
-
-def test_rotations_are_written_with_ten_decimals() -> None:
-    """A cosine is right to half a unit of the tenth decimal: 1e-10 rad, 0.2 µm on the ground from 2 km."""
-    elements = [value for strip in trace("projected")["strips"] for photo in strip["chain"] for value in photo["A"]]
-    assert [round(value, 10) for value in nonempty(elements)] == elements
-    assert [round(value, 9) for value in elements] != elements
-
-
-@pytest.mark.parametrize("place", range(3))
-def test_what_is_left_of_control_is_strip_minus_given(place: int) -> None:
-    row = {"oriented": [5.0, 7.0, 11.0], "given": [4.0, 9.0, 8.0]}
-    assert _left_over(place)(row) == [1.0, -2.0, 3.0][place]
