@@ -20,11 +20,11 @@ from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
 from photostrip.report.page.parts import DASH, Facts
 from photostrip.sheets.replay import first_rounds
 from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
-from photostrip.strip.image_coordinates.corrections import Bending, undistort
+from photostrip.strip.corrections import Bending, undistort
+from photostrip.strip.intersection import Intersection, lies_across
 from photostrip.strip.polynomial_terms import columns as design_columns
 from photostrip.strip.relative_orientation.solution import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, OrientedPhoto, approximate, project, resect
-from photostrip.strip.strip_formation.intersection import Intersection, lies_across
 from photostrip.units import MICROMETRES
 
 Trace = list[Rows]

@@ -34,7 +34,7 @@ from photostrip.points import PhotoPoints, locate
 from photostrip.project.loading import Project, read_project
 from photostrip.project.tables import Tables, rays
 from photostrip.project.yaml.tree import fault_at, key_path
-from photostrip.strip.image_coordinates import corrections
+from photostrip.strip import corrections
 from photostrip.units import MICROMETRES, MILLIMETRES
 
 LEAST_SHARED = 4  # points that orient a photo

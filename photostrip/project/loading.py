@@ -240,7 +240,7 @@ def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenLis
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
     """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
-    from photostrip.pipeline.plausibility import image_evidence
+    from photostrip.pipeline.plausibility import evidence
 
     root, measured = reading.root, tables.observations
     given = valid_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)})
@@ -251,7 +251,7 @@ def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
         inputs, _ = _inputs(completed(given, root, reading.file, measured_photos(read)), read, root, {}, {})
         if not np.isfinite(inputs.observations.xy).all():
             return ()  # the size of a pixel, or the format, is what is missing
-        findings = image_evidence.of_units(inputs, conversion.settings(given))
+        findings = evidence.of_units(inputs, conversion.settings(given))
     except (GeometryError, InputError):
         return ()
     return tuple(places_of(findings, root, listed_points(tables), inputs.flights))

@@ -20,9 +20,9 @@ from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, written
 from photostrip.strip import absolute_orientation
+from photostrip.strip.formed_strip import FirstPhoto, base_angles, intersect_models
 from photostrip.strip.polynomial_terms import POWERS
 from photostrip.strip.relative_orientation.solution import ELEMENTS
-from photostrip.strip.strip_formation.strip import FirstPhoto, base_angles, intersect_models
 
 PAIRED = 15  # control points whose 105 distances can still be read
 PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")

@@ -10,7 +10,7 @@ from photostrip.arrays import Floats
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.quantities import records
 from photostrip.result.records import Records
-from photostrip.strip.strip_formation.strip import FormedStrip
+from photostrip.strip.formed_strip import FormedStrip
 
 DIRECTIONS = ("along", "across", "up")
 PPM = 1e6

@@ -60,25 +60,6 @@ def test_every_output_knows_single_photos() -> None:
     assert compare_results(document, document)["status"] == "same"
 
 
-@pytest.mark.parametrize("screening", ["snooping", "none"])
-@pytest.mark.parametrize(("metres", "degrees"), [(50.0, 2.0), (500.0, 8.0)])
-def test_approximate_orientations_far_off_are_a_start_and_no_more(
-    screening: str, metres: float, degrees: float
-) -> None:
-    """Photos begin hundreds of metres off; no ray may be left out for that, and control in closed form helps."""
-    simulation = simulate(exact(flight=Flight(photos=6), control=MANY))
-    given = orientations(simulation, observed=False)
-    noise = np.random.default_rng(4)
-    given = replace(
-        given,
-        enu=given.enu + noise.normal(0.0, metres, given.enu.shape),
-        angles=given.angles + np.radians(noise.normal(0.0, degrees, given.angles.shape)),
-    )
-    inputs = replace(singles(simulation), orientations=given)
-    result = adjusted(simulation, inputs, screening=screening)
-    assert np.abs(errors(simulation, result)).max() < MICROMETRE
-
-
 @pytest.mark.parametrize("given", ["observed", "approximate", "one short"])
 def test_a_strip_with_a_pair_that_cannot_be_oriented_starts_from_given_orientations(given: str) -> None:
     """Half of a pair's points were taken for others; what the bundle rejects is just these."""

@@ -26,7 +26,7 @@ from photostrip.geometry.similarity import similar
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
-from photostrip.strip.gross_errors.control_search import (
+from photostrip.strip.control_search import (
     ALPHA,
     Columns,
     Deletion,
@@ -36,7 +36,7 @@ from photostrip.strip.gross_errors.control_search import (
     independent,
     projected,
 )
-from photostrip.strip.gross_errors.pair_search import LIKELIER
+from photostrip.strip.pair_search import LIKELIER
 
 EXCHANGED, WRONG_IMAGE, EITHER = "exchanged", "image", "image or coordinates"
 POWER = 0.8  # an error is called detectable when it is found in this share of cases

@@ -17,14 +17,9 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.strip.intersection import Intersection, intersect, lies_across
 from photostrip.strip.relative_orientation.orientation import Orientation
-from photostrip.strip.strip_formation.intersection import Intersection, intersect, lies_across
-from photostrip.strip.strip_formation.scale_transfer import (
-    LEFT_RAY,
-    Junctions,
-    StripFormationSettings,
-    transfer_scale,
-)
+from photostrip.strip.scale_transfer import LEFT_RAY, Junctions, StripFormationSettings, transfer_scale
 
 STEEPEST_BASE = 1e-6  # cosine of the base inclination
 

@@ -22,7 +22,7 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import InputError
 from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.strip.gross_errors.pair_search import PairSearch, ParallaxScatter, rejection, residual_sigma, search
+from photostrip.strip.pair_search import PairSearch, ParallaxScatter, rejection, residual_sigma, search
 from photostrip.strip.relative_orientation.orientation import (
     LEAST_IN_FRONT,
     SCREENINGS,

@@ -26,8 +26,8 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import counted
-from photostrip.strip.independent_models import linking
-from photostrip.strip.independent_models.linking import CommonPoints, ScreenedLinks, Similarities, StripModels
+from photostrip.strip import model_links
+from photostrip.strip.model_links import CommonPoints, ScreenedLinks, Similarities, StripModels
 from photostrip.strip.polynomial_terms import POWERS
 
 AGREE = 4.0  # times the critical value of a link, for positions that several links lie between
@@ -71,7 +71,7 @@ class FormedModels:
     def overturned(self) -> FormedModels:
         """Return the strip turned by 180 degrees about its X axis."""
         turn = np.diag([1.0, -1.0, -1.0])
-        places = linking.Similarities(self.places.scale, turn @ self.places.rotation, self.places.shift @ turn)
+        places = model_links.Similarities(self.places.scale, turn @ self.places.rotation, self.places.shift @ turn)
         return replace(self, places=places, model_xyz=self.model_xyz @ turn, node_xyz=self.node_xyz @ turn)
 
     @property
@@ -113,7 +113,7 @@ class FormedModels:
 def require_links(shared: CommonPoints, models: StripModels, used: Flags, names: Sequence[str]) -> None:
     """Refuse links with fewer than three common points, or with all of them on one line (``used``: rows that count)."""
     count = np.bincount(shared.link[used], minlength=shared.count)
-    for link in np.flatnonzero(count < linking.LEAST_COMMON).tolist():
+    for link in np.flatnonzero(count < model_links.LEAST_COMMON).tolist():
         msg = (
             f"models {names[link]} and {names[link + 1]} have {counted(int(count[link]), 'point')} in common, "
             "perspective centres included: seven parameters need three that are not on one line (three or more and the "
@@ -121,7 +121,7 @@ def require_links(shared: CommonPoints, models: StripModels, used: Flags, names:
         )
         raise GeometryError(msg, code="broken-link")
     centers = np.bincount(shared.link[used & (models.node[shared.before] >= models.points)], minlength=shared.count)
-    for link in np.flatnonzero(linking.extents(shared, models, used) < linking.THIN).tolist():
+    for link in np.flatnonzero(model_links.extents(shared, models, used) < model_links.THIN).tolist():
         why = "" if centers[link] else "; with the common perspective centre it is determined"
         msg = (
             f"the common points of models {names[link]} and {names[link + 1]} lie on one line: the rotation about it "
@@ -137,7 +137,7 @@ def _neighbours(models: StripModels, link: int, names: Sequence[str]) -> str:
         others = [number for number in range(models.count) if number not in {link, link + 1}]
         best = max(others, key=lambda number: len(nodes[model] & nodes[number]), default=model)
         number = len(nodes[model] & nodes[best])
-        if abs(best - model) > 1 and number >= linking.LEAST_COMMON:
+        if abs(best - model) > 1 and number >= model_links.LEAST_COMMON:
             return (
                 f"; model {names[model]} shares {number} with model {names[best]}: are they in the order of the flight?"
             )
@@ -150,7 +150,7 @@ def form_from_models(models: StripModels, links: ScreenedLinks, photos: Numbers)
     xyz = places.of(models.model, models.xyz)
     used = _counting(models, links, places, xyz)
     turn = _upright(models, np.where(used[:, None], xyz, np.nan))
-    places = linking.Similarities(places.scale, turn @ places.rotation, places.shift @ turn.T)
+    places = model_links.Similarities(places.scale, turn @ places.rotation, places.shift @ turn.T)
     xyz = xyz @ turn.T
     node, inverse = np.unique(models.node[used], return_inverse=True)
     count = np.bincount(inverse, minlength=len(node))
@@ -176,7 +176,7 @@ def _chain(links: Similarities) -> Similarities:
         scale[number + 1] = scale[number] * links.scale[number]
         rotation[number + 1] = rotation[number] @ links.rotation[number]
         shift[number + 1] = scale[number] * rotation[number] @ links.shift[number] + shift[number]
-    return linking.Similarities(scale, rotation, shift)
+    return model_links.Similarities(scale, rotation, shift)
 
 
 def _upright(models: StripModels, xyz: Floats) -> Floats:
@@ -199,7 +199,7 @@ def _upright(models: StripModels, xyz: Floats) -> Floats:
         up = np.array([0.0, 0.0, 1.0])
     x = along / np.linalg.norm(along)
     z = up - (up @ x) * x
-    if np.linalg.norm(z) < linking.THIN * np.linalg.norm(up):
+    if np.linalg.norm(z) < model_links.THIN * np.linalg.norm(up):
         return np.eye(3)
     z = z / np.linalg.norm(z)
     return np.array([x, np.cross(z, x), z])

@@ -25,7 +25,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import Fault, InputError
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import lens_distortion
+from photostrip.strip import lens_distortion
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.strip import absolute_orientation, polynomial_terms
 from photostrip.strip.absolute_orientation import Targets
 from photostrip.strip.fitted_strip import Misclosures
-from photostrip.strip.gross_errors.pair_search import gains
+from photostrip.strip.pair_search import gains
 
 ENOUGH = 1e-5  # of half the strip: the adjustment of the misclosures takes out what is left, but for its square
 LARGEST_SECTION = 100  # control coordinates of a section: what one adjustment takes

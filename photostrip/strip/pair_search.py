@@ -34,7 +34,7 @@ from photostrip.strip.relative_orientation.standard_points import MINIMUM_LEFT
 from photostrip.strip.robust import MEDIAN_SPREAD, TUNING, scales
 
 if TYPE_CHECKING:
-    from photostrip.strip.relative_orientation.robust import RobustElements
+    from photostrip.strip.robust import RobustElements
 
 
 LARGEST_SET = 3  # points of a set
@@ -281,7 +281,7 @@ def search(
     if not len(failed):
         scatter = ParallaxScatter.of(given, stated, spoiled)
         return PairSearch(orientation=given, removed=(), scatter=scatter, test=GlobalTest.of(scatter.by_pair))
-    from photostrip.strip.relative_orientation.robust import orient_robustly
+    from photostrip.strip.robust import orient_robustly
 
     part, part_test, log = given.take(failed), test.take(failed), _Log.of(len(failed))
     found = orient_robustly(part.pairs, part_test.sigma, LARGEST_SET)
