@@ -17,9 +17,9 @@ from photostrip.batch.outcomes import EXIT_CODES, failure, not_run
 from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
-from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, counts, outcome_line
-from photostrip.report.page.progress import BatchTable, batch_table, clock
+from photostrip.formats.output.batch import parsed_record, summary_csv, summary_json
+from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, outcome_line
+from photostrip.report.page.progress import batch_progress
 from photostrip.report.page.text import to_text
 from tests.batch.projects import command, environment, write_projects
 
@@ -54,11 +54,6 @@ FAULTY = failure("faulty", InputError([Fault("no <such> photo & \x01", "photo", 
 def test_every_status_has_an_exit_code_and_a_place_in_the_order() -> None:
     assert set(ORDER) == set(EXIT_CODES)
     assert [EXIT_CODES[status] for status in ORDER] == [70, 70, 70, 3, 2, 2, 1, 0, 0, 0, 0]
-
-
-def test_counts_in_words() -> None:
-    assert counts(lines(good(), FAULTY, not_run(), good())) == "4 projects: 1 faulty, 1 not run, 2 good"
-    assert counts(lines(good())) == "1 project: 1 good"
 
 
 def test_of_too_many_projects_the_worst_are_shown() -> None:
@@ -101,45 +96,20 @@ def test_what_is_no_record_is_not_taken_for_one(content: bytes) -> None:
     assert parsed_record(content) is None
 
 
-def test_a_record_comes_back() -> None:
-    record = {
-        "photostrip_batch_record": 1, "program": {"a": "1"}, "project": "µ.yaml", "set": [], "inputs": {"x": None},
-        "outputs": {}, "outcome": good(),
-    }  # fmt: skip
-    assert parsed_record(record_text(record).encode()) == record
-
-
 # ------------------------------------------------------------------------------------------------- meanwhile
-
-
-def test_how_far_and_how_long_still() -> None:
-    table = BatchTable(io.StringIO(), 10, live=False)
-    for name in ("a", "b", "c", "d"):
-        table.begun(name)
-    table.finished("a", failed=False, unchanged=False)
-    table.finished("b", failed=True, unchanged=False)
-    table.finished("x", failed=False, unchanged=True)
-    assert table.head(60.0) == "#########..................... 3 of 10, 1 failed, 1 unchanged, 1:00, about 3:30 to go"
-    cells = [list(column.cells) for column in table.page().columns]
-    assert cells == [["0:00", "0:00"], ["c", "d"]]
-
-
-@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (61, "1:01"), (3600 * 26 + 125, "26:02:05")])
-def test_clock(seconds: float, text: str) -> None:
-    assert clock(seconds) == text
 
 
 def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
     stream = io.StringIO()
-    with batch_table(stream, 2) as table:
-        table.say("one")
+    with batch_progress(stream, 2) as shown:
+        shown.say("one")
         assert stream.getvalue() == "one\n"
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_quick_start")
-def test_a_person_at_a_terminal_sees_a_table(tmp_path: Path) -> None:
-    """Stderr is a terminal: the table is there and goes away, failures stay above it; stdout is the summary alone."""
+def test_a_person_at_a_terminal_sees_a_bar(tmp_path: Path) -> None:
+    """Stderr is a terminal: a bar is there and goes away, failures stay above it; stdout is the summary alone."""
     write_projects(tmp_path / "strips", 12)
     (tmp_path / "strips" / "s3" / "control.csv").unlink()
     ours, theirs = pty.openpty()
@@ -163,6 +133,6 @@ def test_a_person_at_a_terminal_sees_a_table(tmp_path: Path) -> None:
     assert process.returncode == 2
     assert len(out.splitlines()) == 13
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen.decode())
-    assert re.search(r"[#.]{30} \d+ of 12", text)
+    assert re.search(r"\d+/12 \d:\d\d:\d\d .*strips/s", text)
     assert " of 12  strips/s3/project.yaml: faulty: strips/s3/project.yaml" in text
-    assert "strips/s4/project.yaml: good" not in text  # the table says enough
+    assert "strips/s4/project.yaml: good" not in text  # the bar says enough

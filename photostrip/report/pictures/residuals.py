@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from statistics import NormalDist, median
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from photostrip.report.pictures.chart import (
     chart,
     nice,
 )  # fmt: skip
-from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, rays_of
+from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, grouped, rays_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
@@ -66,44 +67,47 @@ def _longer(extent: tuple[Range, Range]) -> float:
 
 def _scale(v: Floats, longest: float) -> tuple[float, float]:
     """Return mm in the photo for each micrometre of a vector, and a round length for the bar, µm."""
-    typical = max(float(np.quantile(np.linalg.norm(v, axis=1), SHARE_ON_SCALE)), 1e-3)
+    typical = max(float(np.quantile(np.append(np.linalg.norm(v, axis=1), 0.0), SHARE_ON_SCALE)), 1e-3)
     return longest / typical, nice(typical / 2)
 
 
-def _arrows(at: Floats, v: Floats, factor: float, most: float, kind: str) -> Segments:
-    """Draw vectors, cut at the longest one."""
-    size = np.linalg.norm(v, axis=1, keepdims=True) * factor
-    return Segments(at, at + v * factor * np.minimum(1.0, most / np.maximum(size, 1e-9)), kind)
+class Vectors(NamedTuple):
+    """Residuals drawn in photos, each cut at twice a length that few of them exceed."""
+
+    extent: tuple[Range, Range]
+    factor: float  # mm in the photo for each micrometre
+    longest: float  # mm
+
+    def panel(self, title: str, at: Floats, v: Floats, hints: Sequence[str], used: Flags) -> Map:
+        size = np.linalg.norm(v, axis=1, keepdims=True) * self.factor
+        ends = at + v * self.factor * np.minimum(1.0, 2 * self.longest / np.maximum(size, 1e-9))
+        layers: list[Layer] = [Areas([box(*self.extent)], "open soft thin"), Segments(at, ends, "ink thin")]
+        for chosen, kind, shape, words in ((used, "c1", "dot", ""), (~used, "failed open", "diamond", "left out")):
+            own = np.flatnonzero(chosen).tolist()
+            layers += [Marks(at[own], kind, shape, [hints[n] for n in own], words, 3.0)] if len(own) else []
+        return Map(layers, title, self.extent)
 
 
 def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
-    rows: dict[str, list[int]] = {}
-    for n in np.flatnonzero(known).tolist():
-        rows.setdefault(rays.photo[n], []).append(n)
-    sizes = {photo: rms(rays.v[[n for n in own if rays.used[n]]]) for photo, own in rows.items()}
+    rows = grouped((rays.photo[n], n) for n in np.flatnonzero(known).tolist())
+    sizes = {photo: rms(rays.v[own][rays.used[own]]) for photo, own in rows.items()}
     worst = sorted(rows, key=lambda photo: -sizes[photo])[:MOST_PHOTOS]
-    shown = [photo for photo in rows if photo in worst]
-    crowded = any(len(rows[photo]) > MOST_RAYS for photo in shown)
-    for photo in shown:
-        rows[photo] = sorted(rows[photo], key=lambda n: -float(np.hypot(*rays.v[n])))[:MOST_RAYS]
-    drawn = [n for photo in shown for n in rows[photo]]
+    size = np.linalg.norm(rays.v, axis=1)
+    shown = {photo: sorted(own, key=lambda n: -size[n])[:MOST_RAYS] for photo, own in rows.items() if photo in worst}
+    drawn = [n for own in shown.values() for n in own]
     extent = _extent(plan, set(shown), at[drawn])
     longest = 0.2 * _longer(extent)
-    factor, bar = _scale(rays.v[[n for n in drawn if rays.used[n]]], longest)
-    hints = {n: f"point {rays.point[n]}: {rays.v[n, 0]:+.1f}, {rays.v[n, 1]:+.1f} µm" for n in drawn}
+    factor, bar = _scale(rays.v[drawn][rays.used[drawn]], longest)
+    vectors = Vectors(extent, factor, longest)
     panels = []
-    for photo in shown:
-        used, out = ([n for n in rows[photo] if bool(rays.used[n]) is kept] for kept in (True, False))
-        layers: list[Layer] = [Areas([box(*extent)], "open soft thin")]
-        layers.append(_arrows(at[rows[photo]], rays.v[rows[photo]], factor, 2 * longest, "ink thin"))
-        layers.append(Marks(at[used], "c1", "dot", [hints[n] for n in used], size=3.0))
-        layers += [Marks(at[out], "failed open", "diamond", [hints[n] for n in out], "left out", 3.0)] if out else []
-        panels.append(Map(layers, f"{photo}: {sizes[photo]:.1f} µm", extent))
+    for photo, own in shown.items():
+        hints = [f"point {rays.point[n]}: {rays.v[n, 0]:+.1f}, {rays.v[n, 1]:+.1f} µm" for n in own]
+        panels.append(vectors.panel(f"{photo}: {sizes[photo]:.1f} µm", at[own], rays.v[own], hints, rays.used[own]))
     caption = (
         "Image residuals at their points, measured minus computed, and their rms in each photo. Errors of one point "
         "stand alone; errors of a photo or camera point the same way side by side."
     )
-    if crowded:
+    if any(len(rows[photo]) > MOST_RAYS for photo in shown):
         caption += f" Of each photo the {MOST_RAYS} largest are drawn."
     if len(shown) < len(rows):
         caption += f" The {len(shown)} of {len(rows)} photos with the largest residuals, in flight order."
@@ -114,34 +118,29 @@ def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
 
 def _planes(plan: Plan, rays: Rays, at: Floats, used: Flags) -> list[Picture]:
     cameras = cameras_of(plan.document)
-    rows: dict[str, list[int]] = {}
-    for n in np.flatnonzero(used).tolist():
-        rows.setdefault(cameras[rays.photo[n]]["id"], []).append(n)
+    rows = grouped((cameras[rays.photo[n]]["id"], n) for n in np.flatnonzero(used).tolist())
     shown = {name: rows[name] for name in list(rows)[:CAMERAS]}
     extents = {name: _extent(plan, {rays.photo[n] for n in own}, at[own]) for name, own in shown.items()}
     cells = {name: _cells(at[own], rays.v[own], _longer(extents[name]) / CELLS) for name, own in shown.items()}
     means = np.concatenate([cell[:, 2:4] for cell in cells.values()])
     if not len(means):
         return []
+    longest = 0.8 * max(map(_longer, extents.values())) / CELLS
+    factor, bar = _scale(means, longest)
     panels = []
     for name, cell in cells.items():
-        cell_size = _longer(extents[name]) / CELLS
-        factor, bar = _scale(means, 0.8 * cell_size)
         hints = [f"{n:.0f} residuals, mean {x:+.2f}, {y:+.2f} µm" for _, _, x, y, n in cell.tolist()]
-        layers: list[Layer] = [Areas([box(*extents[name])], "open soft thin")]
-        layers.append(_arrows(cell[:, :2], cell[:, 2:4], factor, cell_size, "ink"))
-        layers.append(Marks(cell[:, :2], "c1", "dot", hints, size=4.0))
-        panels.append(Map(layers, f"camera {name}", extents[name]))
+        vectors = Vectors(extents[name], factor, longest)
+        panels.append(vectors.panel(f"camera {name}", cell[:, :2], cell[:, 2:4], hints, np.ones(len(cell), bool)))
     caption = (
         "Mean image residual in each part of the image plane, over all photos of a camera. Vectors that follow a "
         "pattern tell of a lens, a film or a plate that the calibration does not describe; those of good photos are "
         "short and mixed."
     )
-    longest = float(np.linalg.norm(means, axis=1).max())
-    words = f"{counted(len(shown), 'camera')}; the largest mean is {longest:.2f} µm."
-    factor, bar = _scale(means, 0.8 * _longer(next(iter(extents.values()))) / CELLS)
-    title = "Mean residuals of the image plane"
+    largest = float(np.linalg.norm(means, axis=1).max())
+    words = f"{counted(len(shown), 'camera')}; the largest mean is {largest:.2f} µm."
     bars = [Bar(bar * factor, f"mean {bar:g} µm")]
+    title = "Mean residuals of the image plane"
     return [chart("image-plane", (title, caption, words), panels, columns=min(2, len(panels)), bars=bars)]
 
 
@@ -154,101 +153,51 @@ def _cells(at: Floats, v: Floats, size: float) -> Floats:
     return np.column_stack([means, count])[count >= LEAST_IN_CELL]
 
 
-class Sample(NamedTuple):
-    """Residuals and what they were tested against."""
-
-    name: str
-    values: Floats
-    unit: str
-    sigma: float
-    limits: list[float]  # none: not tested
-
-    @property
-    def reach(self) -> float:
-        """Return what the axis holds, to both sides."""
-        return max(LEAST_REACH * self.sigma, 1.1 * max(self.limits, default=0.0)) or 1.0
-
-
 def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:
-    """Draw the residuals of a bundle standardised; of strips in µm, beside the y parallaxes that were tested."""
-    document, used = plan.document, known & rays.used
-    tested = rays.test[used]
-    tested = tested[np.isfinite(tested).all(axis=1)].ravel()
-    sizes = rays.v[used].ravel()
-    caption = (
-        "How the image residuals are distributed, each over its own standard deviation, with the limits of the search "
-        "for gross errors."
-    )
-    if len(tested):
-        limits = [document["bundle"]["screening"]["limit"]]
-        samples = [Sample("image residuals", tested, "standard deviations", 1.0, limits)]
-    else:
-        samples = [Sample("image residuals", sizes, "µm", rms(sizes), []), *_parallaxes(document)]
-        caption = (
-            "How the image residuals are distributed. They are smaller than the errors of the measurements, of which "
-            "the orientations took up a part; gross errors were sought in the y parallaxes of the pairs, not here."
-        )
-    for sample in samples[1:]:
-        low, high = min(sample.limits), max(sample.limits)
-        caption += (
-            " On the right the y parallaxes of the points used, and the limit beyond which a point of ordinary "
-            f"redundancy is taken out: {median(sample.limits):.1f} µm in the median of the pairs, {low:.1f} to "
-            f"{high:.1f} µm."
-        )
-    beyond = sum(int((np.abs(sample.values) > sample.reach).sum()) for sample in samples)
-    if beyond:
-        caption += (
-            f" {counted(beyond, 'residual')} beyond the axis {'is' if beyond == 1 else 'are'} counted at its ends."
-        )
-    panels = [_classes(sample, sample.name if len(samples) > 1 else "") for sample in samples]
-    words = "Distribution of the residuals", caption, " ".join(map(_tails, samples))
-    return chart("histogram", words, panels, columns=len(panels), height=240.0)
+    """Draw how what was tested for gross errors is distributed, with the limits.
 
-
-def _parallaxes(document: Document) -> list[Sample]:
-    """Return the y parallaxes of the points used, with the limits of their pairs; nothing without either."""
+    That are the image residuals of a bundle, each over its standard deviation, and the y parallaxes of strips; where
+    nothing was tested, the image residuals.
+    """
+    document, tests = plan.document, rays.test[known & rays.used]
+    tests = tests[np.isfinite(tests).all(axis=1)]
     limits = [row["limit_um"] for row in document["models"] if row.get("limit_um") is not None]
-    values = [
-        size
-        for row in document["parallaxes"]
-        for size, used in zip(row["q_um"], row["used"], strict=True)
-        if used and size is not None
-    ]
-    if not limits or not values:
-        return []
-    return [Sample("y parallaxes of the pairs", np.array(values), "µm", rms(np.array(values)), limits)]
-
-
-def _classes(sample: Sample, title: str) -> Panel:
-    """Draw the counts of classes with the normal curve and the limits."""
-    reach, unit = sample.reach, " µm" if sample.unit == "µm" else ""
-    edges = np.linspace(-reach, reach, BARS + 1)
-    counts = np.histogram(np.clip(sample.values, -reach, reach), edges)[0]
-    x = np.linspace(-reach, reach, 121)
-    sigma = sample.sigma or 1.0
-    curve = len(sample.values) * (edges[1] - edges[0]) * np.exp(-((x / sigma) ** 2) / 2) / (sigma * np.sqrt(2 * np.pi))
-    high = 1.08 * float(max(counts.max(), curve.max()))
-    layers: list[Layer] = []
-    if sample.limits and max(sample.limits) > min(sample.limits):
-        ends = min(sample.limits), max(sample.limits)
-        boxes = [box((-ends[1], -ends[0]), (0.0, high)), box(ends, (0.0, high))]
-        layers.append(Areas(boxes, "area failed", words="all limits"))
+    if len(tests):
+        limits, unit, sigma = [document["bundle"]["screening"]["limit"]], "", 1.0
+        values, what = tests.ravel(), "image residuals, each over its own standard deviation"
+    else:
+        pairs: list[Document] = document["parallaxes"] if limits else []
+        used = [zip(pair["q_um"], pair["used"], strict=True) for pair in pairs]
+        parallaxes = [size for pair in used for size, taken in pair if taken and size is not None]
+        values = np.array(parallaxes) if parallaxes else rays.v[known & rays.used].ravel()
+        limits, unit, sigma = limits if parallaxes else [], " µm", rms(values) or 1.0
+        what = "y parallaxes of the pairs" if parallaxes else "image residuals"
+    reach = max(LEAST_REACH * sigma, 1.1 * max(limits, default=0.0))
+    edges, x = np.linspace(-reach, reach, BARS + 1), np.linspace(-reach, reach, 121)
+    counts = np.histogram(np.clip(values, -reach, reach), edges)[0].tolist()
+    curve = len(values) * (edges[1] - edges[0]) / sigma * np.exp(-((x / sigma) ** 2) / 2) / np.sqrt(2 * np.pi)
+    high = 1.08 * float(max(*counts, curve.max()))
     columns = [n for n in range(BARS) if counts[n]]
-    boxes = [box((float(edges[n]), float(edges[n + 1])), (0.0, float(counts[n]))) for n in columns]
-    layers.append(Areas(boxes, "column", [counted(int(counts[n]), "residual") for n in columns], "residuals"))
-    layers.append(Line(np.column_stack([x, curve]), "c2", f"normal curve, σ = {sigma:.3g}{unit}"))
-    if sample.limits:
-        limit = median(sample.limits)
+    boxes = [box((float(edges[n]), float(edges[n + 1])), (0.0, counts[n])) for n in columns]
+    layers: list[Layer] = [
+        Areas(boxes, "column", [counted(counts[n], "residual") for n in columns], what.partition(",")[0]),
+        Line(np.column_stack([x, curve]), "c2", f"normal curve, σ = {sigma:.3g}{unit}"),
+    ]
+    caption = f"How the {what} are distributed"
+    if limits:
+        limit, ends = median(limits), (min(limits), max(limits))
         words = f"median limit ±{limit:.1f} µm" if unit else f"rejected beyond ±{limit:.2f}"
         foot, head = (np.array([(-limit, y), (limit, y)]) for y in (0.0, high))
+        sides = [box((-ends[1], -ends[0]), (0.0, high)), box(ends, (0.0, high))]
+        layers = [Areas(sides, "area failed", words="all limits")] * (ends[0] < ends[1]) + layers
         layers.append(Segments(foot, head, "failed dashed", words=words))
-    return Panel(layers, title, (f"residual, {sample.unit}", "number"), (-reach, reach), (0.0, high))
-
-
-def _tails(sample: Sample) -> str:
-    three = int((np.abs(sample.values) > 3 * sample.sigma).sum())
-    chance = 2 * NormalDist().cdf(-3.0) * len(sample.values)
-    return (
-        f"{len(sample.values)} {sample.name.split(' of ')[0]}, {three} beyond three standard deviations; "
-        f"{chance:.1f} would be by chance."
-    )
+        caption += ", with the limits of the search for gross errors"
+        caption += f": {ends[0]:.1f} to {ends[1]:.1f} µm for points of ordinary redundancy" if unit else ""
+    beyond = int((np.abs(values) > reach).sum())
+    if beyond:
+        caption += f". At the ends of the axis {counted(beyond, 'residual')} beyond it"
+    three, chance = int((np.abs(values) > 3 * sigma).sum()), 2 * NormalDist().cdf(-3.0) * len(values)
+    words = f"{len(values)} in all, {three} beyond three standard deviations; {chance:.1f} would be by chance."
+    labels = f"residual{f',{unit}' if unit else ' over its standard deviation'}", "number"
+    panel = Panel(layers, "", labels, (-reach, reach), (0.0, high))
+    return chart("histogram", ("Distribution of the residuals", f"{caption}.", words), [panel], height=240.0)

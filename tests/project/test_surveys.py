@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.project.terrestrial.cameras import known_presets, own_presets
-from photostrip.project.terrestrial.directions import CamerasFile
-from photostrip.project.terrestrial.survey import load_survey
+from photostrip.project.directions import CamerasFile
+from photostrip.project.phototheodolites import known_presets, own_presets
+from photostrip.project.survey import load_survey
 from photostrip.project.yaml.reading import read_keys
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty

@@ -9,6 +9,20 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, read_points
 from photostrip.formats.text.tables import Table
+from photostrip.project.phototheodolites import (
+    COORDINATE,
+    DEGREES,
+    DIRECTION_SIGMA,
+    ECCENTRICITY,
+    IMAGE_SIGMA_UM,
+    MILLIMETRES,
+    RADIANS,
+    REFRACTION,
+    SIGNIFICANCE,
+    STEP,
+    CameraOrName,
+    refuse_outside,
+)
 from photostrip.project.schema.sections import (
     After,
     FirstSchema,
@@ -27,9 +41,7 @@ from photostrip.project.schema.sections import (
     rule,
     wrong,
 )
-from photostrip.project.terrestrial import ranges
-from photostrip.project.terrestrial.cameras import CameraOrName
-from photostrip.project.terrestrial.tables import STEEPEST
+from photostrip.project.terrestrial_tables import STEEPEST
 from photostrip.project.yaml.reading import Reading
 from photostrip.terrestrial.accuracy import Theodolite
 from photostrip.terrestrial.normal_case import (
@@ -48,10 +60,10 @@ KILOMETRE = 1e6  # mm
 # both faces [Pollmer 1976].
 THEODOLITES = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
 USUAL_DIRECTION = 2.0  # arcseconds
-Angle = Annotated[Number, After(bounded(ranges.DEGREES))]
-Micrometres = Annotated[Number, After(bounded(ranges.IMAGE_SIGMA_UM))]
-Seconds = Annotated[Number, After(bounded(ranges.DIRECTION_SIGMA))]
-Level = Annotated[Number, After(bounded(ranges.SIGNIFICANCE))]
+Angle = Annotated[Number, After(bounded(DEGREES))]
+Micrometres = Annotated[Number, After(bounded(IMAGE_SIGMA_UM))]
+Seconds = Annotated[Number, After(bounded(DIRECTION_SIGMA))]
+Level = Annotated[Number, After(bounded(SIGNIFICANCE))]
 Unit = Annotated[Words, After(one_of("mm", "um"))]
 SIGMA = "Standard deviation of x, z and the principal distance"
 
@@ -80,13 +92,13 @@ class Looking(WithCamera):
 
     @property
     def attitude(self) -> Attitude:
-        unit = ranges.RADIANS[self.angles]
+        unit = RADIANS[self.angles]
         angles = (self.alpha * unit, self.omega * unit, self.kappa * unit)
         return Attitude(angles, ground_from_photo(*angles), self.angles)
 
     @rule
     def _has_an_azimuth(self) -> None:
-        if abs(np.cos(self.omega * ranges.RADIANS[self.angles])) < GIMBAL:
+        if abs(np.cos(self.omega * RADIANS[self.angles])) < GIMBAL:
             message = f"with {self.omega:g} {self.angles} the camera looks straight up or down, and has no azimuth"
             raise wrong(message, code="range", at="omega", expected="an elevation below 90 degrees")
 
@@ -119,7 +131,7 @@ class AccuracyFile(Looking):
     """How accurately correction directions must be measured, all over the photo."""
 
     sigma_um: Micrometres = key(SIGMA, 5.0, unit="um")
-    step: Annotated[Number, After(bounded(ranges.STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
+    step: Annotated[Number, After(bounded(STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
     as_printed: Flag = key("The formulas as the source prints them; for a level camera", False)  # noqa: FBT003
 
     @rule
@@ -159,7 +171,7 @@ class TheodoliteFile(Looking, Measuring):
     """Which image accuracy a theodolite can vouch for, all over the photo."""
 
     sigma_um: Micrometres | None = key("Image accuracy wanted: how many rounds it needs", None, unit="um")
-    step: Annotated[Number, After(bounded(ranges.STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
+    step: Annotated[Number, After(bounded(STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
 
     @rule
     def _has_a_precision(self) -> None:
@@ -173,10 +185,10 @@ class OrientationFile(WithCamera, Measuring):
 
     table: Words = key("Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]`, .csv or .csv.gz")
     free: list[Annotated[Words, After(one_of(*FREE))]] = key(f"Determined besides the angles: {', '.join(FREE)}", [])
-    eccentricity: Annotated[Number, After(bounded(ranges.ECCENTRICITY))] = key(
+    eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
         "Front nodal point ahead of the theodolite's axes; needs the column `distance`", 0.0, unit="m"
     )
-    refraction: Annotated[Number, After(bounded(ranges.REFRACTION))] = key(
+    refraction: Annotated[Number, After(bounded(REFRACTION))] = key(
         "Coefficient that computed directions lack; needs the column `distance`", 0.0
     )
     unit: Unit = key("Unit of image coordinates", "mm")
@@ -227,15 +239,15 @@ class Points(NamedTuple):
 
 def image_points(given: DirectionsFile, reading: Reading) -> Points:
     """Read image points, or raise every fault."""
-    scale = ranges.MILLIMETRES[given.unit]
-    points, _ = _points(given, reading, IMAGE_POINTS, ranges.COORDINATE.scaled(scale, given.unit))
+    scale = MILLIMETRES[given.unit]
+    points, _ = _points(given, reading, IMAGE_POINTS, COORDINATE.scaled(scale, given.unit))
     return points._replace(values=points.values * scale)
 
 
 def direction_points(given: PhotoFile, reading: Reading, camera: Phototheodolite) -> Points:
     """Read directions; refuse what the photo cannot show."""
-    points, table = _points(given, reading, DIRECTION_POINTS, ranges.DEGREES.scaled(1.0, given.angles))
-    directions = points.values * ranges.RADIANS[given.angles]
+    points, table = _points(given, reading, DIRECTION_POINTS, DEGREES.scaled(1.0, given.angles))
+    directions = points.values * RADIANS[given.angles]
     steep = np.abs(directions[:, 1]) > STEEPEST
     seen = photo_from_directions(directions, camera.principal_distance, given.attitude.rotation)
     for row in np.flatnonzero(steep | np.isnan(seen).any(axis=1)).tolist():
@@ -259,7 +271,7 @@ def _points(given: Pointed, reading: Reading, layout: tuple, limits: Range) -> t
     for path, findings in reading.named(("table",)):
         table = read_points(path, layout, findings)
         if table is not None:
-            ranges.refuse_outside(table, names, limits, findings)
+            refuse_outside(table, names, limits, findings)
     for row, pair in enumerate(given.at):
         for column, value in enumerate(pair):
             if not limits.holds(value):
