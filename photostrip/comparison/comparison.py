@@ -18,12 +18,23 @@ from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
+from photostrip.result.quantities import MATRIX
 from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
+from photostrip.result.table import Table
 
 SCHEMA = 1
 # What is ours, what the other numbers are made of, and what is made of them.
-LEFT_OUT = ("version", "statement", "certificate", "residuals", "parallaxes", "link_residuals")
-RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials"}  # whose records a set counts
+LEFT_OUT = (
+    "version",
+    "statement",
+    "certificate",
+    "residuals",
+    "parallaxes",
+    "link_residuals",
+    "covariances",
+    "fiducial_marks",
+)
+RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials", "polynomial_terms"}  # whose records a set counts
 SAME_FRAME = {
     "crs": "the CRS",
     "kind": "the kind of frame",
@@ -96,14 +107,11 @@ def _require_comparable(document: Document, baseline: Document, files: tuple[str
 
 def _frame(document: Document) -> Document:
     """Return the frame of a document; an empty one when there is none."""
-    found = document.get("frame")
-    return found if isinstance(found, dict) else {}
+    return dict(document.get("frame") or {})
 
 
 def _common_points(document: Document, baseline: Document) -> bool:
-    now, before = (
-        {row.get("id") for row in each.get("points") or [] if isinstance(row, dict)} for each in (document, baseline)
-    )
+    now, before = (set(each["points"]["id"]) if "points" in each else set() for each in (document, baseline))
     return bool(now & before)
 
 
@@ -267,23 +275,23 @@ def _sizes(kind: str, block: str, ids: list[str], sizes: Floats) -> Iterator[Dif
 def _rotations(document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare rotations by the angle of the rotation from one to the other, which no convention of angles changes."""
     for now, before in _pairs(document["photos"], baseline["photos"]):
-        if now["rotation"] is None or before["rotation"] is None:
-            if now["rotation"] != before["rotation"]:
+        if now["r11"] is None or before["r11"] is None:
+            if now["r11"] != before["r11"]:
                 yield "rotation", "photos", now["id"], math.inf
             continue
-        one, other = (np.array(row["rotation"], float).reshape(3, 3) for row in (now, before))
+        one, other = (np.array([row[name] for name in MATRIX], float) for row in (now, before))
         # 2 sqrt(2) sin(angle / 2) is the length of the difference: exact for the smallest angles, unlike the cosine
         half = min(float(np.linalg.norm(one - other)) / math.sqrt(8.0), 1.0)
         yield "rotation", "photos", now["id"], math.degrees(2.0 * math.asin(half))
 
 
-def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, Document]]:
+def _pairs(now: Table, before: Table) -> list[tuple[Document, Document]]:
     """Return the records that stand in both lists, by id."""
     known = {row["id"]: row for row in before}
     return [(row, known[row["id"]]) for row in now if row["id"] in known]
 
 
-def _shared(now: list[Document], before: list[Document], keys: Sequence[str]) -> tuple[list[str], Floats]:
+def _shared(now: Table, before: Table, keys: Sequence[str]) -> tuple[list[str], Floats]:
     """Return the ids in both lists, and three numbers of each, now and before (2, n, 3); NaN where there is none."""
     pairs = _pairs(now, before)
     values = [[[row[key] for key in keys] for row in pair] for pair in pairs]

@@ -39,8 +39,9 @@ def _choices(document: Document) -> Iterator[Member]:
     yield "adjustment", "", f"adjustment {document['adjustment']}"
     for block in document.get("polynomials", []):
         yield "polynomials", block["strip"], f"degree {block['degree']} of strip {block['strip']}"
-        for axis, terms in block["terms"].items():
-            yield "polynomials", block["strip"], f"terms of {axis}, strip {block['strip']}: {' '.join(terms) or 'none'}"
+        for axis in "xyz":
+            terms = " ".join(document["polynomial_terms"].where(strip=block["strip"], axis=axis)["term"]) or "none"
+            yield "polynomials", block["strip"], f"terms of {axis}, strip {block['strip']}: {terms}"
     for row in document["points"]:
         if row["role"] != "new":
             yield "points", row["id"], f"{row['id']} is {row['role']}"
@@ -52,7 +53,7 @@ def _choices(document: Document) -> Iterator[Member]:
 
 def _rejected(document: Document) -> Iterator[Member]:
     for row in document["rejected"]:
-        if not row.get("readmitted", False):
+        if not row["readmitted"]:
             photos = " – ".join(photo for photo in (row["photo"], row["other_photo"]) if photo)
             where = f" on {photos}" if photos else ""
             yield "rejected", row["point"], f"{row['point']}{where}, {row['stage'].replace('_', ' ')}"

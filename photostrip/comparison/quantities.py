@@ -10,21 +10,23 @@ from photostrip.result.description import quantity_at
 
 Number = float | None
 
-DEGREES = {"deg": 1.0, "gon": 0.9, "rad": 57.29577951308232}
 ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
+DISCREPANCY = tuple(f"discrepancy_{direction}" for direction in ("along", "across", "up"))
 SCALES = {"scale", "scale_factor", "factor"}
 # Keys that name the records of a list, where it is not their id.
 NAMES = {
     "absolute": ("strip",),
     "polynomials": ("strip",),
+    "polynomial_terms": ("strip", "axis", "term"),
     "models": ("left", "right"),
     "junctions": ("photo",),
     "links": ("before", "after"),
 }
 # What is compared of a record.
 KEPT = {
-    "absolute": ("scale", "sigma0", "redundancy", "misclosure_rms"),
-    "polynomials": ("sigma0", "redundancy"),
+    "absolute": ("scale", "sigma0", "redundancy", *(f"misclosure_rms_{axis}" for axis in ("east", "north", "up"))),
+    "polynomials": tuple(f"{name}_{axis}" for name in ("sigma0", "redundancy") for axis in "xyz"),
+    "polynomial_terms": ("effect",),
     "models": (
         "scale_factor",
         "sigma0_um",
@@ -33,11 +35,18 @@ KEPT = {
         "points_used",
         "points_rejected",
         "redundancy",
+        *(f"elements_{name}" for name in ELEMENTS),
     ),
-    "junctions": ("factor", "points_used", "spread_ppm", "discrepancy"),
-    "links": ("factor", "sigma0", "points_used", "redundancy", "discrepancy"),
+    "junctions": ("factor", "points_used", "spread_ppm", *DISCREPANCY),
+    "links": ("factor", "sigma0", "points_used", "redundancy", *DISCREPANCY),
     "photos": ("image_rms_um", "points"),
     "points": ("image_rms_um", "rays"),
+}
+
+
+SIGMAS = {
+    "points": ("sigma_x", "sigma_y", "sigma_z"),
+    "photos": ("sigma_x", "sigma_y", "sigma_z", "sigma_angle_1", "sigma_angle_2", "sigma_angle_3"),
 }
 
 
@@ -62,15 +71,12 @@ def quantities_of(document: Document) -> Iterator[ComparedNumber]:
     for strip in document["strips"]:
         yield from _numbers("strips", strip["id"], strip)
     for block, keys in KEPT.items():
-        for row in document.get(block, []) if block in {"polynomials", "links"} else document[block]:
+        for row in document.get(block, []):
             name = name_of(block, row)
-            yield from SPECIAL[block](name, row) if block in SPECIAL else ()
-            yield from _numbers(block, name, {key: row[key] for key in keys})
-            if block == "photos":
-                yield from _precisions(name, "sigma", row["sigma"])
-            elif block == "points":
-                for key in ("sigma_x", "sigma_y", "sigma_z"):
-                    yield ComparedNumber(kind="precision", block="points", id=name, name=key, unit="m", value=row[key])
+            yield from _numbers(block, name, {key: row[key] for key in keys if key in row})
+            for key in SIGMAS.get(block, ()):
+                unit = "" if block == "photos" else "m"
+                yield ComparedNumber(kind="precision", block=block, id=name, name=key, unit=unit, value=row[key])
 
 
 def name_of(block: str, row: Document) -> str:
@@ -103,39 +109,3 @@ def _kind_and_unit(block: str, path: str, value: object) -> tuple[str, str]:
     if isinstance(value, int):
         return "counts", ""
     return "rotation" if unit == "deg" else "statistics", unit
-
-
-def _effects(name: str, block: Document) -> Iterator[ComparedNumber]:
-    """Return the size of each term at the end of the control's range, in metres, rather than its coefficient."""
-    for axis, effects in block["effects"].items():
-        for term, effect in zip(block["terms"][axis], effects, strict=True):
-            yield ComparedNumber(
-                kind="statistics", block="polynomials", id=name, name=f"effect {axis} {term}", unit="m", value=effect
-            )
-
-
-def _elements(name: str, model: Document) -> Iterator[ComparedNumber]:
-    """Return the elements of relative orientation in degrees; none where a model was measured as such."""
-    elements = model["elements"]
-    for element in ELEMENTS if elements is not None else ():
-        value, unit = elements[element], DEGREES[elements["unit"]]
-        yield ComparedNumber(
-            kind="rotation",
-            block="models",
-            id=name,
-            name=element,
-            unit="deg",
-            value=None if value is None else value * unit,
-        )
-
-
-def _precisions(name: str, path: str, value: object) -> Iterator[ComparedNumber]:
-    """Return the standard deviations of a photo, whatever they are called."""
-    if isinstance(value, dict | list):
-        for key, each in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _precisions(name, f"{path}.{key}" if isinstance(value, dict) else f"{path}[{key}]", each)
-    elif _is_number(value):
-        yield ComparedNumber(kind="precision", block="photos", id=name, name=path, unit="", value=value)
-
-
-SPECIAL = {"polynomials": _effects, "models": _elements}

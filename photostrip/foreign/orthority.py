@@ -10,6 +10,8 @@ Described by orthority.readthedocs.io, file formats: CSV, exterior and interior 
 
 from __future__ import annotations
 
+import json
+
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -17,7 +19,6 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
-from photostrip.formats.output import json_encoder
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
@@ -26,7 +27,7 @@ from photostrip.notes import counted
 
 HEADER = ("filename", "x", "y", "z", "omega", "phi", "kappa", "camera")
 WITH_TABS = ("label", "X", "Y", "Z", "omega", "phi", "kappa")
-text = json_encoder.UNICODE.value
+text = json.JSONEncoder(ensure_ascii=False, allow_nan=False, default=list).encode
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document, named
-from photostrip.result.records import as_lists
+from photostrip.result.table import plain_of
 
 if TYPE_CHECKING:
     from photostrip.formats.text.writing import Content
@@ -48,12 +48,12 @@ class Result:
 
     @cached_property
     def document(self) -> Document:
-        """The content of result.json: plain dictionaries, lists, texts and numbers."""
-        return dict(as_lists(self._document))
+        """The content of result.json: plain dictionaries, lists, texts and numbers; tables as blocks of columns."""
+        return dict(plain_of(self._document))
 
     @property
-    def in_columns(self) -> Document:
-        """The same with its records as columns, as it is printed and written: a fifth of the memory."""
+    def in_tables(self) -> Document:
+        """The same with its tables, as it is printed and written: a fifth of the memory."""
         return self._document
 
     @property
@@ -94,7 +94,7 @@ class Result:
     @cached_property
     def pairs(self) -> Table:
         """Relative orientation of the pairs, or the independent models: elements, parallaxes, scale."""
-        return self._table("pairs")
+        return self._table("models")
 
     @cached_property
     def strips(self) -> Table:
@@ -133,9 +133,9 @@ class Result:
 
     def _table(self, name: str) -> Table:
         from photostrip.library.table import Table
-        from photostrip.result.tables import table_of
 
-        return Table(name, table_of(self._document, name), self._document.get("frame"))
+        table = self._document[name]
+        return Table(name, {key: table[key] for key in table.columns}, table.quantities, self._document["frame"])
 
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
@@ -266,13 +266,13 @@ class Result:
             return {}
         from photostrip.foreign.exports import exported
 
-        return exported(self.document, self._exports).files
+        return exported(self._document, self._exports).files
 
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
         from photostrip.report.pictures.result.pictures import picture_files
 
-        return picture_files(self.document)
+        return picture_files(self._document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
@@ -325,7 +325,7 @@ def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, 
     if form == "html":
         from photostrip.report.html import to_html
 
-        return to_html(as_lists(document))  # its tables are looped over often
+        return to_html(document)
     from photostrip.report.page import layout, text
     from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
 

@@ -17,6 +17,7 @@ from photostrip.library.project import loaded_from
 from photostrip.notes import Document
 from photostrip.project.yaml.parsing import LARGEST_PROJECT
 from photostrip.result.statement.edited import is_edited
+from photostrip.result.table import plain_of
 
 SCHEMA = 1
 SAME, DIFFERENT = "same", "different"
@@ -59,7 +60,7 @@ def verify(result: Path, project: Path | None = None) -> Document:
     }
     with reading_from(Source()) as account:
         try:
-            again = loaded_from(place, certificate["set"]).run().document
+            again = loaded_from(place, certificate["set"]).run().in_tables
         except (InputError, GeometryError) as error:
             found["refused"] = str(error)
         else:
@@ -117,7 +118,7 @@ def _compared(document: Document, again: Document, file: str, folder: Path) -> D
         if before["versions"].get(name) != version
     ]
     grids = {each["file"]: each["sha256"] for each in now["grids"]}
-    others = [key for key in again if key not in LEFT_OUT and _other(document.get(key), again[key])]
+    others = [key for key in again if key not in LEFT_OUT and _other(plain_of(document.get(key)), plain_of(again[key]))]
     return {
         "versions": versions,
         "grids": _states(before["grids"], grids, folder),

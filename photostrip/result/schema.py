@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from photostrip.result.description import Quantity, Table, described
-from photostrip.result.document import SCHEMA
+from photostrip.result.description import SCHEMA, Block, Columns, Quantity, described
 
 URI = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {"text": "string", "word": "string", "count": "integer", "flag": "boolean", "number": "number"}
@@ -33,10 +32,10 @@ def result_page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _block(table: Table, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
+def _block(block: Block, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
     """Describe a block of keys; the blocks below it go into `blocks` by the keys that lead to them."""
     found: dict[str, Any] = {}
-    for key, entry in table.items():
+    for key, entry in block.items():
         path = f"{above}.{key}" if above else key
         if isinstance(entry, Quantity):
             found[key] = _value(entry)
@@ -74,8 +73,8 @@ def _unit(entry: Quantity) -> str:
     return of.get(entry.unit, entry.unit) or WORDS.get(entry.kind, "")
 
 
-def _quantities(table: Table, above: str) -> Iterator[tuple[str, Quantity]]:
-    for key, entry in table.items():
+def _quantities(block: Block, above: str) -> Iterator[tuple[str, Quantity]]:
+    for key, entry in block.items():
         path = f"{above}.{key}" if above else key
         if isinstance(entry, Quantity):
             yield path, entry
