@@ -12,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE # or each of the hundreds of processes that the
 
 KATEX := .venv-site/node_modules/katex/dist
 
-.PHONY: demo test check lint types lowest bench docs site golden regress man clean
+.PHONY: demo test check lint types lowest bench docs site golden regress clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -65,9 +65,6 @@ regress: $(VENV)/photostrip.installed ## adjust the sample projects that changed
 
 golden: $(VENV)/dev.installed ## compute the baselines of sample_data, which regress and the tests compare with, anew
 	$(BIN)/python -m tests.renew_golden
-
-man: $(VENV)/photostrip.installed ## write the manual pages into build/man/man1
-	$(BIN)/photostrip man -o build/man/man1
 
 clean: ## remove everything that make has made
 	rm -rf $(VENV) .venv-lowest .venv-site build dist .hypothesis .pytest_cache .ruff_cache

@@ -15,10 +15,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 import photostrip
 from photostrip.cli.command_table import COMMANDS
-from photostrip.cli.jobs.manual import EXIT_CODES, VARIABLES, every_command, records
 from photostrip.cli.main import main as command_line
+from photostrip.cli.whole_program import whole_program
 from photostrip.result.schema import result_page
 
 if TYPE_CHECKING:
@@ -29,6 +31,21 @@ PARAGRAPH = re.compile(r"(Returns|Raises|Source:?) ?")
 WIDTH = 100  # of a signature on one line
 STEPS = ("interior", "refine", "relative", "chain", "intersection", "scale_transfer", "strip", "absolute", "polynomial",
          "resection", "bundle")  # fmt: skip
+
+
+EXIT_CODES = (
+    ("0", "Done."),
+    ("1", "Done, but a tolerance or a comparison failed."),
+    ("2", "Wrong usage, project file or data."),
+    ("3", "The geometry is too weak, singular or did not converge."),
+    ("70", "An internal error, a bug."),
+)
+VARIABLES = (
+    ("PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET, PHOTOSTRIP_VERBOSE, PHOTOSTRIP_DEBUG",
+     "Stand in for the options of these names."),
+    ("NO_COLOR", "When set, no colours are used."),
+    ("OMP_NUM_THREADS", "Threads of the numerical libraries; one when it is not set."),
+)  # fmt: skip
 
 
 def python_page() -> str:
@@ -154,9 +171,29 @@ def _escaped(text: str) -> str:
     )
 
 
+def every_command() -> Iterator[tuple[str, Any]]:
+    """Return every command with its name, each followed by those below it."""
+    root: Any = typer.main.get_command(whole_program())
+    waiting = [(name, root.commands[name]) for name in COMMANDS]
+    while waiting:
+        name, command = waiting.pop(0)
+        yield name, command
+        below = getattr(command, "commands", {})
+        waiting = [*((f"{name} {inner}", each) for inner, each in below.items()), *waiting]
+
+
+def records(command: Any, kind: str) -> Iterator[tuple[str, str]]:  # noqa: ANN401
+    """Return what ``--help`` says of the arguments, or of the options."""
+    with command.make_context(command.name, [], resilient_parsing=True) as context:
+        for each in command.get_params(context):
+            record = each.get_help_record(context)
+            if each.param_type_name == kind and record is not None:
+                yield record
+
+
 def command_page() -> str:
-    """Write every command with its arguments and options, as ``--help`` and the manual pages have them."""
-    lines = ["# Reference: commands", "", "The same as `photostrip COMMAND --help` and `photostrip man COMMAND`.", ""]
+    """Write every command with its arguments and options, as ``--help`` has them."""
+    lines = ["# Reference: commands", "", "The same as `photostrip COMMAND --help`.", ""]
     for name, command in every_command():
         lines += [f"## `photostrip {name}`", ""]
         for paragraph in (command.help or "").partition("\f")[0].replace("\b", "").strip().split("\n\n"):

@@ -56,14 +56,6 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
 
 
 @pytest.mark.slow
-def test_methods_prints_errors_and_ratios() -> None:
-    out = printed("methods.py", "--seeds", "1", "--models", "6", "--bands", "3")
-    (row,) = re.findall(r"^\| 6 \| 3 \|((?: \d+\.\d \|){4}) (\d\.\d\d) / (\d\.\d\d) \|", out, re.MULTILINE)
-    assert all(1.0 < float(value) < 100.0 for value in nonempty(row[0].split("|")[:-1]))
-    assert re.search(r"times the errors of the bundle: 3 bands: (up to 6 models|never)$", out, re.MULTILINE)
-
-
-@pytest.mark.slow
 def test_bundle_prints_times_and_ratios() -> None:
     out = printed("bundle.py", "--rounds", "1", "--cases", "strip", "--largest", "100", "--alone")
     rows = re.findall(r"^(\d+) x (\d+) +\d+ +\d+ +(\d+) +(\d+) +- +- +- +3/0/0 +-$", out, re.MULTILINE)
@@ -82,28 +74,6 @@ def test_bundle_prints_growth(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.slow
-def test_batch_prints_overhead_and_speed_up() -> None:
-    out = printed("batch.py", "--strips", "2", "--rounds", "1", "--photos", "8")
-    for words in (
-        "batch -j 1, all processes, to the bare computation",
-        "batch -j 2 to batch -j 1, speed-up on the clock",
-    ):
-        assert re.search(rf"^{words} +\d+\.\d\d  target 1\.\d0$", out, re.MULTILINE)
-    assert re.search(r"^50000 such strips unchanged +\d+\.\d min$", out, re.MULTILINE)
-
-
-@pytest.mark.slow
-def test_planning_prints_predicted_and_actual_deviations() -> None:
-    options = ("--repeat", "30", "--models", "4", "--layouts", "3 bands", "--methods", "similarity", "bundle")
-    out = printed("planning.py", "--part", "model", "strip", *options)
-    rows = re.findall(r"^(\S+(?: \S+)?) +(new|control|similarity|bundle)((?: +\d+\.\d{3}){6})   \d", out, re.MULTILINE)
-    assert [row[:2] for row in rows][-2:] == [("3 bands", "similarity"), ("3 bands", "bundle")]
-    ratios = [float(value) for row in rows for value in (row[2].split()[2], row[2].split()[5])]
-    assert len(ratios) == 20
-    assert all(0.7 < ratio < 1.4 for ratio in nonempty(ratios))
-
-
-@pytest.mark.slow
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
     assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 4
@@ -116,29 +86,6 @@ def test_gross_errors_prints_two_tables_for_one_project() -> None:
 def test_gross_errors_finds_wrong_control() -> None:
     out = printed("gross_errors.py", "1", "--kind", "wrong-control", "--workers", "1", "--first-seed", "3")
     assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
-
-
-@pytest.mark.slow
-def test_detectable_prints_what_tests_can_find_beside_what_is_found() -> None:
-    out = printed("detectable.py", "1", "--first-seed", "200004", "--workers", "1")
-    rows = re.findall(r"^([a-z, ]+?) +(\d+) +(\d+\.\d) +(\d+) +\S+ sd$", out, re.MULTILINE)
-    assert len(rows) == 6
-    assert rows[-1][0] == "all"
-    for column in (1, 3):
-        assert sum(int(row[column]) for row in nonempty(rows[:-1])) == int(rows[-1][column])
-    assert all(float(missed) <= int(drawn) for _, drawn, missed, _ in nonempty(rows))
-    assert int(rows[-1][3]) < 0.5 * int(rows[-1][1])
-
-
-@pytest.mark.slow
-def test_screening_prints_how_the_time_grows() -> None:
-    out = printed("screening.py", "--growth", "20", "40")
-    assert re.findall(r"^ +(\d\.\d) +(20|40)(?: +-?\d+\.\d){3} +-?\d+\.\d{2} +-?\d+\.\d{3}$", out, re.MULTILINE) == [
-        ("0.0", "20"),
-        ("0.0", "40"),
-        ("3.0", "20"),
-        ("3.0", "40"),
-    ]
 
 
 @pytest.mark.slow
@@ -164,16 +111,3 @@ def test_a_planted_mistake_counts_where_the_sum_of_squares_grows(low: float, hig
     wrong = film.plant(film.make(43003))
     assert wrong is not None
     assert film.can_be_told(43003, wrong[0]) is told
-
-
-@pytest.mark.slow
-def test_variance_components_prints_a_row_for_each_group() -> None:
-    out = printed("variance_components.py", "1", "--workers", "1")
-    assert (
-        len(
-            re.findall(
-                r"^(?:image|control|positions)[a-z ]* +\d\.00 +\d\.\d{3} +nan(?: +\d\.\d{3}){2}$", out, re.MULTILINE
-            )
-        )
-        == 5
-    )

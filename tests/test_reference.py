@@ -6,9 +6,8 @@ import re
 
 import photostrip
 from photostrip.cli.command_table import COMMANDS
-from photostrip.cli.jobs.manual import every_command
 from tests.loops import nonempty
-from tests.reference import command_page, plain_fences, python_page
+from tests.reference import command_page, every_command, plain_fences, python_page
 
 
 def test_every_public_name_is_explained() -> None:

@@ -38,11 +38,6 @@ _TEXTS = (
         "photostrip statement result --class-plan 15 --class-height 20",
     ),
     (
-        "verify",
-        "Make a result again from its certificate, and say what differs.",
-        "photostrip verify result --project project.yaml",
-    ),
-    (
         "compare",
         "Compare a result with a baseline, within tolerances.",
         "photostrip compare result baseline.json --tol exact.yaml",
@@ -78,16 +73,12 @@ _TEXTS = (
         "photostrip schema -o photostrip.schema.json",
     ),
     ("completion", "Print the script that makes a shell complete commands.", "photostrip completion bash >> ~/.bashrc"),
-    ("man", "Print a manual page, or write all of them.", "photostrip man -o ~/.local/share/man/man1"),
     ("info", "Print versions and formats, and how to get what is missing.", "photostrip info --format json"),
 )
 _MODULES = {
     "completion": "shell",
-    "man": "shell",
     "plan": "plan.plan",
     "sources": "info",
-    "statement": "statements.statement",
-    "verify": "statements.verify",
 }  # where it is not that of the command's name
 COMMANDS = {
     name: CommandEntry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example)

@@ -208,26 +208,15 @@ class Result:
     def statement(
         self,
         classes_cm: Mapping[str, float] | None = None,
-        *,
-        profile: str | PathLike[str] | None = None,
-        required: str = "",
     ) -> Document:
         """Return the accuracy statement of the result, as ``photostrip statement --format json`` prints it.
 
         classes_cm: classes that a contract asks for, by ``plan`` and ``height``.
-        profile, required: a profile of accuracy classes (YAML), and the class of it that must be kept.
         Raises InputError with every reason why nothing can be stated.
         """
         from photostrip.result.statement.accuracy_statement import statement_document
 
-        classes = None
-        if profile is not None:
-            from pathlib import Path
-
-            from photostrip.project.profiles.classes import load_classes
-
-            classes = load_classes(Path(profile))[0]
-        return statement_document(self._document, self.name, classes_cm, classes, required)
+        return statement_document(self._document, self.name, classes_cm)
 
     def trace(self, form: str = "text") -> str:
         """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.

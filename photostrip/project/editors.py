@@ -15,7 +15,6 @@ KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
     "tolerances": ("profiles.tolerances", "ToleranceFile", "photostrip tolerance profile"),
-    "statement": ("profiles.classes", "ClassFile", "photostrip accuracy classes"),
     "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
     "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
     "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),

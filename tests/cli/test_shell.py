@@ -1,33 +1,19 @@
-"""Completion in real shells, and manual pages that say what ``--help`` says."""
+"""Completion in real shells."""
 
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
-from functools import cache
 from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.command_table import COMMANDS
 from photostrip.cli.jobs.completion import keys
-from photostrip.cli.jobs.manual import manual_pages
 from photostrip.cli.main import main
-from tests.cli.helps import FOLDER
-from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-MACROS = {".TH", ".SH", ".B", ".PP", ".TP", ".nf", ".fi"}
-
-
-@cache
-def pages() -> dict[str, str]:
-    return manual_pages()
-
 
 # --------------------------------------------------------------------------------------------------- completion
 
@@ -98,61 +84,3 @@ def test_the_keys_are_those_of_the_project_file() -> None:
 def test_completion_does_not_disturb_the_environment() -> None:
     main(["completion", "bash"])
     assert "_PHOTOSTRIP_COMPLETE" not in os.environ
-
-
-# ------------------------------------------------------------------------------------------------------- manual
-
-
-def plain(page: str) -> str:
-    """Give a page as words, without the signs of roff."""
-    text = re.sub(r"\\f[BIR]", "", page)
-    for sign, meant in (("\\-", "-"), ("\\(ga", "`"), ("\\(ti", "~"), ("\\(ha", "^"), ("\\&", ""), ("\\e", "\\")):
-        text = text.replace(sign, meant)
-    return " ".join(text.split())
-
-
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_a_page_says_what_the_help_says(name: str) -> None:
-    page = plain(pages()[f"photostrip-{name}.1"])
-    text = (FOLDER / f"{name}.txt").read_text(encoding="utf-8")
-    options = set(re.findall(r"(?m)^  (?:-\w, )?(--[a-z-]+)", text))
-    assert options
-    assert sorted(option for option in options if option not in page) == []
-    description = text.split("\n\n")[1]
-    assert " ".join(description.split()) in page
-    assert COMMANDS[name].example in page
-
-
-def test_every_command_has_a_page_and_the_first_names_them() -> None:
-    first = plain(pages()["photostrip.1"])
-    for name in COMMANDS:
-        assert f"photostrip-{name}(1)" in first
-    assert "photostrip-terrestrial-directions-orient.1" in pages()
-
-
-@pytest.mark.parametrize("name", sorted(pages()))
-def test_a_page_is_sound_roff(name: str) -> None:
-    for line in nonempty(pages()[name].splitlines()):
-        assert not line.startswith("'")
-        assert not line.startswith(".") or line.split()[0] in MACROS, line
-        assert line.isascii()
-        assert not re.search(r"(?<!\\)-", line.removeprefix(".")), "a minus sign that may be broken or made a hyphen"
-    sections = re.findall(r"(?m)^\.SH (.+)$", pages()[name])
-    assert sections[:3] == ["NAME", "SYNOPSIS", "DESCRIPTION"]
-    assert sections[-3:] == ["EXIT STATUS", "ENVIRONMENT", "SEE ALSO"]
-
-
-@pytest.mark.skipif(shutil.which("mandoc") is None, reason="needs mandoc")
-def test_mandoc_has_nothing_to_say_but_that_there_is_no_date(tmp_path: Path) -> None:
-    assert main(["man", "-o", str(tmp_path), "--quiet"]) == 0
-    files = sorted(map(str, tmp_path.glob("*.1")))
-    assert len(files) == len(pages())
-    done = subprocess.run(["mandoc", "-Tlint", "-Wwarning", *files], capture_output=True, text=True, check=False)
-    assert [line for line in done.stdout.splitlines() if "missing date" not in line] == []
-
-
-@pytest.mark.slow
-def test_a_page_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["man", "rnu"]) == 2
-    assert "there is no page of 'rnu'; there are batch" in capsys.readouterr().err
-    assert main(["man", "terrestrial displacement"]) == 0

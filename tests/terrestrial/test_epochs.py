@@ -76,7 +76,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_errors_are_as_large_as_stated(kind: str) -> None:
     """Unbiased; 95 % ellipses and ellipsoids cover 93 to 97 %; 4 to 6 % of the points at rest are called moved."""
-    runs = 40  # of many points each; benchmarks/terrestrial.py takes more
+    runs = 40  # of many points each
     count = repeated(KINDS[kind], runs)
     errors = np.concatenate(count.errors)
     assert np.abs(errors.mean(axis=0)).max() < 4 / np.sqrt(runs)  # points of one run share the turn of the camera

@@ -19,9 +19,6 @@ def schema(
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
     ] = False,
-    statement: Annotated[
-        bool, typer.Option("--statement", help="The accuracy classes of `photostrip statement` instead.")
-    ] = False,
     result: Annotated[
         bool, typer.Option("--result", help="What result.json may hold; written to FILE.md as a page of its keys.")
     ] = False,
@@ -47,7 +44,7 @@ def schema(
             return
         found = result_schema()
     else:
-        flags = {"tolerances": tolerances, "statement": statement, "simulation": simulation}
+        flags = {"tolerances": tolerances, "simulation": simulation}
         kind = next((name for name, wanted in flags.items() if wanted), plan or "project")
         found = schema_of(kind)
     text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"

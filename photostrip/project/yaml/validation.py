@@ -27,7 +27,6 @@ KINDS = {  # of files, by the key that holds the number of their schema
     "photostrip_terrestrial": "a project for `photostrip terrestrial displacement`",
     "photostrip_cameras": "a list of cameras for `photostrip terrestrial`",
     "photostrip_tolerances": "a tolerance profile for `photostrip compare --tol`",
-    "photostrip_statement": "a profile of accuracy classes for `photostrip statement --profile`",
     "photostrip_result": "a result for `photostrip report` and `photostrip compare`",
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from photostrip.notes import Document, counted
+from photostrip.notes import Document, counted, listed
 from photostrip.report.page.numbers import short, unit
 from photostrip.report.page.parts import DASH, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
@@ -34,8 +34,14 @@ def compare_sections(document: Document, *, quiet: bool = False, everything: boo
     verdict = Words(headline(document), "good" if same else "failed")
     if quiet:
         return (Section("", (verdict,)),)
+    head: list[Part] = [verdict]
+    if "again" in document:
+        head += [
+            Words(f"{row['name']} is {row['now'] or 'not used'}, it was {row['certificate'] or 'not used'}", mark="-")
+            for row in document["again"]["versions"]
+        ]
     found = [
-        Section("", (verdict, tabulated(document["kinds"], KINDS))),
+        Section("", (*head, tabulated(document["kinds"], KINDS))),
         *_lacking(document, everything=everything),
         *_sets(document["sets"], everything=everything),
     ]
@@ -58,7 +64,8 @@ def headline(document: Document) -> str:
     )
     alone = sum(row["difference"] is None for row in document["differences"])
     of_these = f", {alone} of them in one of the two only" if alone else ""
-    parts = [f"{counted(numbers, 'number')} beyond tolerance{of_these}"] if numbers else []
+    parts = _since(document["again"]) if "again" in document else []
+    parts += [f"{counted(numbers, 'number')} beyond tolerance{of_these}"] if numbers else []
     parts += [f"the result lacks {counted(gone, 'number')} of the baseline"] if gone else []
     parts += [
         f"{NAMES[each['kind']]}: {len(each['missing'])} missing, {len(each['new'])} new"
@@ -66,6 +73,14 @@ def headline(document: Document) -> str:
         if each["differs"]
     ]
     return f"DIFFERENT: {names} differ: {'; '.join(parts)}."
+
+
+def _since(again: Document) -> list[str]:
+    """Say what has changed since a result was made: its own numbers, the files that went in."""
+    parts = ["the numbers of the result are not those of its certificate: it was edited"] if again["edited"] else []
+    states = dict.fromkeys(row["state"] for row in again["files"])
+    files = {state: [row["file"] for row in again["files"] if row["state"] == state] for state in states}
+    return [*parts, *(f"{state}: {listed(names)}" for state, names in files.items())]
 
 
 def allowed_words(kind: Document) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-from photostrip.notes import Document, counted, listed
+from photostrip.notes import Document, listed
 from photostrip.report.page.numbers import fixed, metres, signed
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
@@ -56,8 +54,6 @@ def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, t
         Section("Measures", (_measures(document),)),
         Section("Check points", (_check_points(document),)),
     ]
-    if document["profile"]:
-        found.append(_classes(document["profile"], document["required"]))
     remarks: list[Part] = [Words(text, mark="-") for text in document["remarks"]]
     sign = Facts(tuple((label, LINE) for label in ("Place, date", "Name, office", "Signature")))
     end = Section("To be signed", (*remarks, Words(CONFIRMED), sign))
@@ -65,12 +61,7 @@ def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, t
 
 
 def _headline(document: Document) -> str:
-    text = HEADLINES[document["status"]]
-    if document["required"]:
-        profile = document["profile"]
-        kept = any(each["kept"] for each in profile["classes"] if each["name"] == document["required"])
-        text += f" The class {document['required']} of {profile['name']} is {'' if kept else 'not '}kept."
-    return text
+    return HEADLINES[document["status"]]
 
 
 def _facts(document: Document) -> Facts:
@@ -135,28 +126,6 @@ def _check_points(document: Document) -> Table:
         number("height", "height", signed, "m"),
     )
     return tabulated(document["check_points"], columns, note="adjusted minus given")
-
-
-def _classes(profile: Document, required: str) -> Section:
-    best = profile["best"]
-    text = f"The narrowest class that is kept: {best}." if best else "No class is kept."
-    if profile["check_points"] > 1:
-        text += f" It asks for {counted(profile['check_points'], 'check point')}."
-    columns = (
-        words("class", lambda row: f"{row['name']}{' (asked for)' if row['name'] == required else ''}"),
-        words("measure", "meaning"),
-        number("found", "found", 3, "m"),
-        number("allowed", "limit", 3, "m"),
-        words("", lambda row: "kept" if row["kept"] else "NOT KEPT"),
-    )
-    rows = [{**limit, "name": each["name"]} for each in profile["classes"] for limit in each["limits"]]
-    return Section(profile["name"], (Words(text), *_with_sources(profile, tabulated(rows, columns))))
-
-
-def _with_sources(profile: Document, table: Table) -> Iterator[Part]:
-    yield table
-    yield Words(f"By {profile['source']}")
-    yield from (Words(f"{each['name']}: {each['source']}", mark="-") for each in profile["classes"] if each["source"])
 
 
 def certificate_section(document: Document) -> Section:

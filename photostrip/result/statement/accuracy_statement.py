@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, Fault, InputError
 from photostrip.notes import Document, listed
-from photostrip.result.statement.classes import ClassProfile, classified
 from photostrip.result.statement.edited import EDITED, is_edited
-from photostrip.result.statement.stating import NOT_MET, REFUSED, STANDARD, TESTED, stated
+from photostrip.result.statement.stating import REFUSED, STANDARD, TESTED, stated
 
 SCHEMA = 1
 # Measures of ISO 19157:2013, annex D: identifier, name, alias, where it stands in the block `statement`.
@@ -31,13 +30,10 @@ def statement_document(
     document: Document,
     file: str,
     wanted: Mapping[str, float] | None = None,
-    profile: ClassProfile | None = None,
-    required: str = "",
 ) -> Document:
     """Return the statement on a result.
 
     wanted: classes in centimetres that a contract asks for, by ``plan`` and ``height``.
-    profile, required: classes of another norm, and the one of them that must be kept.
     Raises InputError with every reason why nothing can be stated.
     """
     fix = "run the project again with this version of photostrip"
@@ -52,14 +48,6 @@ def statement_document(
     block = stated({**document["statement"], "reasons": reasons}, wanted)
     if block["status"] == REFUSED:
         raise InputError(_fault(each, file) for each in block["reasons"])
-    classes = None if profile is None else classified(block, profile)
-    if classes is not None and required:
-        row = next((each for each in classes["classes"] if each["name"] == required), None)
-        if row is None:
-            names = listed([each["name"] for each in classes["classes"]])
-            raise InputError(Fault(f"the profile has no class `{required}`", "word", key="--require", expected=names))
-        if not row["kept"]:
-            block = block | {"status": NOT_MET}
     return {
         "photostrip_statement": SCHEMA,
         "version": document["version"],
@@ -73,8 +61,6 @@ def statement_document(
         **{key: block[key] for key in ("status", "sentences", "remarks", *FIGURES)},
         "asked_cm": dict(wanted or {}),
         "iso_19157": [_measure(block, *each) for each in ISO_MEASURES],
-        "profile": classes,
-        "required": required,
         "axes_of_frame": document["frame"]["axes"],
         "check_points": [
             {key: row[key] for key in ("id", "dx", "dy", "dz", "plan", "height")}

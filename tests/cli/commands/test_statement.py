@@ -12,7 +12,6 @@ from photostrip.formats.output.result_json import to_json
 from tests.loops import nonempty
 from tests.result.statement.test_evidence import GOOD, block, certified
 from tests.results import case
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -70,12 +69,6 @@ def test_every_form_says_the_same(capsys: pytest.CaptureFixture[str], tmp_path: 
         (["--class-plan", "5"], 2),  # the check points are not good enough to say so
         (["--class-plan", "nan"], 2),
         (["--class-plan", "0"], 2),
-        (["--require", "1 m"], 2),
-        (["--profile", str(ROOT / "configs/tolerances/contour-interval.yaml"), "--require", "1 m"], 0),
-        (["--profile", str(ROOT / "configs/tolerances/contour-interval.yaml"), "--require", "0.25 m"], 1),
-        (["--profile", str(ROOT / "configs/tolerances/contour-interval.yaml"), "--require", "3 m"], 2),
-        (["--profile", str(ROOT / "configs/tolerances/exact.yaml")], 2),
-        (["--profile", "missing.yaml"], 2),
         (["-o", "statement.pdf"], 2),
     ],
 )

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from benchmarks.variance_components import TRUE, factors
 from photostrip.errors import GeometryError
 from photostrip.network import reliability
 from photostrip.network.solve import solve
@@ -222,9 +221,43 @@ def test_errors_of_the_detectable_size_are_found_as_often_as_said() -> None:
 # --------------------------------------------------------------------------------------------- variance components
 
 
+TRUE = {"image": 2.0, "control plan": 3.0, "control height": 1.0, "positions plan": 4.0, "positions height": 4.0}
+
+
+def scattered(random: np.random.Generator, number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Draw errors in three coordinates whose mean squares are 1."""
+    drawn = random.normal(size=(number, 3))
+    return np.asarray(drawn / np.sqrt((drawn**2).mean(axis=0)))
+
+
+def factors(seed: int) -> tuple[dict[str, float], float]:
+    """Give the factors that one block finds by group, without those that are not estimated, and its sigma0."""
+    spec = Spec(
+        seed=seed,
+        flight=Flight(photos=8, strips=3),
+        points=Points(extra_per_model=8),
+        image=Image(sigma_um=10.0),
+        control=Control(bands=5, noise=(0.0, 0.0, 0.0)),
+    )
+    simulation, random = simulate(spec), np.random.default_rng(seed)
+    inputs = inputs_of(simulation)
+    used, enu = ~inputs.control.check, inputs.control.enu.copy()
+    enu[used] += scattered(random, int(used.sum())) * (0.15, 0.15, 0.08)
+    inputs = replace(
+        inputs,
+        observations=replace(inputs.observations, sigma=np.full_like(inputs.observations.sigma, 0.005)),
+        control=replace(inputs.control, enu=enu),
+        positions=positions(simulation, noise=0.2 * scattered(random, 24)),
+    )
+    result = adjusted(simulation, inputs, variance_components=True)
+    found = document_of(result)["bundle"]["variance_components"]
+    estimated = {each["group"]: float(each["factor"]) for each in found if each["estimated"]}
+    return estimated, np.nan if result.bundle is None else result.bundle.screened.solution.sigma0
+
+
 @pytest.mark.slow
 def test_variance_components_find_what_was_misstated() -> None:
-    """Two blocks, which know each factor to 2 to 6 %, that of control heights to 15 %; the benchmark takes 40."""
+    """Two blocks, which know each factor to 2 to 6 %, that of control heights to 15 %."""
     found = [factors(seed) for seed in range(2)]
     assert [sigma0 for _, sigma0 in found] == pytest.approx([1.0, 1.0], abs=0.01)
     assert all(each.keys() == TRUE.keys() for each, _ in nonempty(found))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from benchmarks.planning import Task, repetitions
 from photostrip.errors import GeometryError, InputError
 from photostrip.planning.strip.design import DesignTask, along_the_strip, bands_needed, outcome, plan_strip
 from photostrip.planning.strip.ideal_strip import ControlLayout, Spot, StripGeometry, across, ideal_strip, spots_of
@@ -18,6 +17,7 @@ from photostrip.planning.strip.placement import Demand, Placement, best_places, 
 from photostrip.simulation import FILM, Points
 from photostrip.strip.gross_errors.pairs.screening import DETECTABLE
 from tests.loops import nonempty
+from tests.planning.strip.repeated import scatter
 
 if TYPE_CHECKING:
     from photostrip.planning.strip.ideal_strip import IdealStrip
@@ -111,13 +111,10 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     geometry = StripGeometry(FILM, 8)
     strip = ideal_strip(geometry)
     methods = (SIMILARITY, BUNDLE)
-    count = 100
-    found = repetitions(Task(geometry, (layout,), methods, 0, count))
+    scattered = scatter(geometry, layout, methods, 100)
     for method in nonempty(methods):
         expected = accuracy(strip, layout, spots_of(layout, 8, 5), method)
-        total, squares = found[layout.name, method]
-        scatter = np.sqrt(squares / count - (total / count) ** 2)[expected.new]
-        ratio = expected.sigmas[expected.new] / scatter
+        ratio = expected.sigmas[expected.new] / scattered[method][expected.new]
         # 100 repetitions know the rms over all points to about 5 %, single coordinates to 7 %
         assert np.sqrt((ratio**2).mean()) == pytest.approx(1.0, abs=0.1)
         assert ratio.min() > 0.75

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,7 +12,7 @@ from photostrip.cli.stdout import Document, Format, StatementFormat, form_of, pr
 HTML = ".html"
 
 
-def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
+def statement(
     result: Saved,
     class_plan: Annotated[
         float | None,
@@ -23,12 +22,6 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
         float | None,
         typer.Option("--class-height", metavar="CM", min=0.1, max=1e6, help="Class in height that is asked for, cm."),
     ] = None,
-    profile: Annotated[
-        Path | None, typer.Option("--profile", metavar="FILE", help="Accuracy classes of another norm (YAML).")
-    ] = None,
-    require: Annotated[
-        str, typer.Option("--require", metavar="CLASS", help="Class of the profile that must be kept.")
-    ] = "",
     output: Target = None,
     form: Annotated[
         StatementFormat | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How it is printed.")
@@ -39,7 +32,7 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """State the accuracy of a result in the words of the norms, to be signed.
 
     The ASPRS standard (edition 2, 2024) tests with 30 check points and counts their own error; beside it stand the
-    measures of ISO 19157, CE90 and LE90, the NSSDA, and with --profile the classes of another norm. The exit code is 1
+    measures of ISO 19157, CE90 and LE90, and the NSSDA. The exit code is 1
     when a class that is asked for is not met or the check points are fewer than the standard asks for. Nothing is
     stated, with exit code 2, where the evidence does not carry it: no check points, check points that stand out or are
     not known well enough, a result that FAILED or is UNVERIFIED, a local frame. FILE may end in .txt, .md, .html or
@@ -47,19 +40,15 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """
     from photostrip.cli.failures import failures_as
     from photostrip.formats.output.result_json import read_result
-    from photostrip.project.profiles.classes import load_classes
     from photostrip.result.statement.accuracy_statement import exit_code, statement_document
 
-    if require and profile is None:
-        raise typer.BadParameter("a class is one of a profile: give --profile as well", param_hint="--require")
     page = output is not None and form is None and output.suffix.lower() == HTML
     wanted = Format(form.value) if form else form_of(output) if output is not None and not page else Format.TEXT
     given = {"plan": class_plan, "height": class_height}
     file = str(result / "result.json" if result.is_dir() else result)
     with failures_as(wanted):
-        classes = None if profile is None else load_classes(profile)[0]
         asked = {part: size for part, size in given.items() if size is not None}
-        found = statement_document(read_result(file), file, asked, classes, require)
+        found = statement_document(read_result(file), file, asked)
         if output is not None:
             from photostrip.formats.text.writing import write_text
 

@@ -13,8 +13,7 @@ import pytest
 import photostrip
 from photostrip.cli.main import main
 from photostrip.formats.text.source import digest
-from photostrip.library import verification
-from photostrip.library.verification import verify
+from photostrip.library.again import compare_again
 from photostrip.result.statement.certificate import result_hash
 from tests.loops import nonempty
 from tests.source_tree import ROOT
@@ -82,21 +81,13 @@ def test_presets_and_overrides_stand_in_the_certificate(copied: Path) -> None:
     assert block["set"] == ['name="other"']
 
 
-@pytest.mark.usefixtures("_adjusted_each_time")
-def test_what_has_not_changed_comes_out_again(copied: Path) -> None:
-    found = verify(copied / "result")
-    assert found["status"] == "same"
-    assert Path(found["project"]) == copied / "project.yaml"
-    assert found["result_sha256"]["now"] == found["result_sha256"]["certificate"]
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("_adjusted_each_time")
 @pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
-def test_what_was_overridden_is_overridden_again(copied: Path, adjustment: str) -> None:
+def test_what_has_not_changed_comes_out_again(copied: Path, adjustment: str) -> None:
     photostrip.run(copied / "project.yaml", processing={"adjustment": adjustment}).write(copied / "result")
-    found = verify(copied / "result")
-    assert (found["status"], found["words"]) == ("same", [])
+    compared = compare_again(copied / "result")
+    assert (compared["status"], compared["again"]) == ("same", {"edited": False, "files": [], "versions": []})
 
 
 @pytest.mark.slow
@@ -106,19 +97,18 @@ def test_the_project_is_found_above_the_result(
 ) -> None:
     shutil.copytree(copied / "result", copied / "result" / "bundle")  # as --compare-methods writes them
     monkeypatch.chdir(copied / working)
-    assert verify(Path(result))["status"] == "same"
+    assert compare_again(Path(result))["status"] == "same"
 
 
 def test_a_file_that_has_changed_is_named(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (copied / "control.csv").open("a", encoding="utf-8") as file:
         file.write("\n")  # changes the content and no number
-    assert main(["verify", str(copied / "result")]) == 1
+    assert main(["compare", str(copied / "result"), "--again"]) == 1
     printed = " ".join(capsys.readouterr().out.split())
-    assert "DIFFERENT: changed: control.csv." in printed
+    assert "differ: changed: control.csv." in printed
     (copied / "control.csv").unlink()
-    assert main(["verify", str(copied / "result"), "--quiet"]) == 1
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "missing: control.csv; the project cannot be adjusted any more" in printed
+    assert main(["compare", str(copied / "result"), "--again"]) == 2
+    assert "control.csv" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -126,60 +116,57 @@ def test_a_certificate_must_name_the_files_that_are_read_and_no_others(
     copied: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What a certificate names is not opened for that: a device would be read without end."""
-    project, found = str(copied / "project.yaml"), document(copied)
-    inputs = found["certificate"]["inputs"]
-    found["certificate"]["inputs"] = [*inputs, {"file": "/dev/null", "sha256": digest(b"")}]
-    assert main(["verify", str(edited(copied, found)), "--project", project, "--quiet"]) == 1
-    assert "DIFFERENT: not read: /dev/null." in capsys.readouterr().out
-    found["certificate"]["inputs"] = []
-    assert main(["verify", str(edited(copied, found)), "--project", project, "--quiet"]) == 1
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "not in the certificate: control.csv, observations.csv, project.yaml." in printed
+    project, saved = copied / "project.yaml", document(copied)
+    inputs = saved["certificate"]["inputs"]
+    saved["certificate"]["inputs"] = [*inputs, {"file": "/dev/zero", "sha256": digest(b"")}]
+    assert main(["compare", str(edited(copied, saved)), "--again", "--project", str(project), "--quiet"]) == 1
+    assert "not read: /dev/zero." in " ".join(capsys.readouterr().out.split())
+    saved["certificate"]["inputs"] = []
+    files = compare_again(edited(copied, saved), project)["again"]["files"]
+    assert {(row["file"], row["state"]) for row in files} == {
+        (name, "not in the certificate") for name in ("control.csv", "observations.csv", "project.yaml")
+    }
 
 
 @pytest.mark.slow
 def test_the_project_may_have_another_name(copied: Path) -> None:
     project = (copied / "project.yaml").rename(copied / "renamed.yaml")
-    assert verify(copied / "result", project)["status"] == "same"
+    assert compare_again(copied / "result", project)["status"] == "same"
 
 
 @pytest.mark.slow
 def test_an_edited_result_is_told(copied: Path) -> None:
-    project = copied / "project.yaml"
-    found = document(copied)
-    found["points"][0]["x"] += 0.5
-    answer = verify(edited(copied, found), project)
-    assert (answer["status"], answer["edited"], answer["numbers"]["status"]) == ("different", True, "different")
-    found["certificate"]["result_sha256"] = result_hash(found)  # edited by someone who knows of the hash
-    answer = verify(edited(copied, found), project)
-    assert (answer["status"], answer["edited"]) == ("different", False)
-    assert answer["result_sha256"]["now"] != answer["result_sha256"]["certificate"]
-    del found["points"][0]
-    (row,) = [each for each in verify(edited(copied, found), project)["numbers"]["sets"] if each["kind"] == "ids"]
-    assert (row["missing"], len(row["new"])) == ([], 1)  # the result made again has what the other lacks
-    found = document(copied)
-    found["statement"]["remarks"] = ["all is well"]  # neither hashed nor compared
-    answer = verify(edited(copied, found), project)
-    assert (answer["status"], answer["edited"], answer["words"]) == ("different", False, ["statement"])
+    project, saved = copied / "project.yaml", document(copied)
+    saved["points"][0]["x"] += 0.5
+    compared = compare_again(edited(copied, saved), project)
+    assert (compared["status"], compared["again"]["edited"], len(compared["differences"])) == ("different", True, 1)
+    saved["certificate"]["result_sha256"] = result_hash(saved)  # edited by someone who knows of the hash
+    compared = compare_again(edited(copied, saved), project)
+    assert (compared["status"], compared["again"]["edited"]) == ("different", False)
 
 
 @pytest.mark.slow
 def test_other_versions_are_named_and_are_no_difference(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = document(copied)
-    found["certificate"]["versions"]["numpy"] = "1.0"
-    path = edited(copied, found)
-    assert main(["verify", str(path), "--project", str(copied / "project.yaml")]) == 0
+    saved = document(copied)
+    saved["certificate"]["versions"]["numpy"] = "1.0"
+    path = edited(copied, saved)
+    assert main(["compare", str(path), "--again", "--project", str(copied / "project.yaml")]) == 0
     assert "it was 1.0" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\x00\xff", b"{", b'{"photostrip_result": 1}', b'{"photostrip_result": NaN}']
-)
+@pytest.mark.parametrize("content", [b"", b"\x00\xff", b"{", b'{"photostrip_result": 1}'])
 def test_what_cannot_be_read_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str], content: bytes) -> None:
     (tmp_path / "result.json").write_bytes(content)
-    assert main(["verify", str(tmp_path)]) == 2
-    assert main(["verify", str(tmp_path / "none.json")]) == 2
+    assert main(["compare", str(tmp_path), "--again"]) == 2
     assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "options", [[], ["other", "--again"], ["other", "--project", "p.yaml"], ["--again", "--update"]]
+)
+def test_a_baseline_or_again_and_not_both(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result", *options]) == 2
+    assert "give a BASELINE, or --again" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_result_without_its_project_ends_with_2(
@@ -188,19 +175,9 @@ def test_a_result_without_its_project_ends_with_2(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     shutil.copy(copied / "result" / "result.json", "result.json")
-    assert main(["verify", "result.json"]) == 2
+    assert main(["compare", "result.json", "--again"]) == 2
     assert "its project is not found" in capsys.readouterr().err
-    found = document(copied)
-    del found["certificate"]
-    assert main(["verify", os.fspath(edited(copied, found)), "--format", "json"]) == 2
+    saved = document(copied)
+    del saved["certificate"]
+    assert main(["compare", os.fspath(edited(copied, saved)), "--again", "--format", "json"]) == 2
     assert "no-certificate" in capsys.readouterr().out
-
-
-def test_small_differences_of_another_machine_are_none() -> None:
-    other = verification._other
-    assert not other({"a": [1.0, "x", None]}, {"a": [1.0001, "x", None]})
-    assert other({"a": 1.0}, {"a": 1.01})
-    assert other({"a": 1.0}, {"b": 1.0})
-    assert other([1.0], [1.0, 2.0])
-    assert other(None, 1.0)
-    assert not other([1.0], (1.0,))  # of settings

@@ -1,1 +1,0 @@
-"""What is signed, as commands: the accuracy statement, the verification of a certificate."""
