@@ -34,7 +34,14 @@ LEFT_OUT = (
     "covariances",
     "fiducial_marks",
 )
-RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials", "polynomial_terms"}  # whose records a set counts
+RECORDS_IN_SETS = {
+    "photos",
+    "points",
+    "models",
+    "strips",
+    "polynomials",
+    "polynomial_terms",
+}  # whose records a set counts
 SAME_FRAME = {
     "crs": "the CRS",
     "kind": "the kind of frame",

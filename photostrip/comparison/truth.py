@@ -25,7 +25,6 @@ COORDINATES = {"plan": 2, "height": 1}
 FIX = "simulate it again"  # for a truth that was edited
 
 
-
 def compare_with_truth(document: Document, truth: Document, files: tuple[str, str] = ("", "")) -> Document:
     """Compare the points, photos and rejections of a result with the truth of its simulation.
 

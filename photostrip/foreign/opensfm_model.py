@@ -8,8 +8,6 @@ Described by opensfm.org/docs/dataset.html, geometry.html; the tracks are those 
 
 from __future__ import annotations
 
-import json
-
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 
@@ -20,6 +18,7 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.foreign.opensfm import POINT
+from photostrip.formats.output.result_json import on_one_line as text
 from photostrip.geodesy.ground_frame import true_axes
 from photostrip.notes import Document, counted
 from photostrip.project.schema.exports import ENDINGS
@@ -28,7 +27,6 @@ DISTORTION = ("k1", "k2", "k3", "p1", "p2")
 TRACKS = "tracks.csv"
 HEAD = "OPENSFM_TRACKS_VERSION_v2\n"
 OTHERS = "0.001\t128\t128\t128\t-1\t-1"  # scale of a feature, its colour, segmentation and instance: none of ours
-text = json.JSONEncoder(ensure_ascii=False, allow_nan=False, default=list).encode
 
 
 def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | bytes], list[str]]:

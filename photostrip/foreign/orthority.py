@@ -10,8 +10,6 @@ Described by orthority.readthedocs.io, file formats: CSV, exterior and interior 
 
 from __future__ import annotations
 
-import json
-
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -20,6 +18,7 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.output.result_json import on_one_line as text
 from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles
@@ -27,7 +26,6 @@ from photostrip.notes import counted
 
 HEADER = ("filename", "x", "y", "z", "omega", "phi", "kappa", "camera")
 WITH_TABS = ("label", "X", "Y", "Z", "omega", "phi", "kappa")
-text = json.JSONEncoder(ensure_ascii=False, allow_nan=False, default=list).encode
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 

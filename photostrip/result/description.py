@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 SCHEMA = 2  # number of the format of result.json
 LIST = " list"
@@ -31,7 +32,7 @@ class Quantity:
 
     @classmethod
     def of(cls, form: str, meaning: str) -> Quantity:
-        """Read a form, as ``um 2``, ``ratio 4 digits``, ``by unit``, ``frame``, ``any m``, ``text`` or ``text list``."""
+        """Read a form, as ``um 2``, ``ratio 4 digits``, ``by unit``, ``frame``, ``any m`` or ``text list``."""
         if form.endswith(LIST):
             return replace(cls.of(form.removesuffix(LIST), meaning), many=True)
         kind, *rest = form.split()
@@ -47,43 +48,48 @@ class Quantity:
         return cls(meaning, "number", unit, decimals=places)
 
 
-class Columns(dict[str, Quantity]):
+class Block(dict[str, Any]):
+    """What stands under the keys of a block: quantities, blocks and tables."""
+
+    optional = False  # whether it may be missing, where a kind of project does not have it
+
+
+class Columns(Block):
     """What the columns of a table are."""
-
-
-Block = dict[str, "Quantity | Columns | Block"]
 
 
 def described() -> Block:
     """Return what stands under each key of a result, blocks within blocks; tables are ``Columns``."""
-    return {key: entry for key, entry in _everything().items() if key not in BESIDE}
+    return Block((key, entry) for key, entry in _everything().items() if key not in BESIDE)
 
 
 @cache
 def _everything() -> Block:
-    found: Block = {}
-    places: list[Block | Columns] = [found]
+    found = Block()
+    places = [found]
     for line in Path(__file__).with_name("quantities.txt").read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
-            kind = Columns if line.startswith("[[") else dict
-            places = [_made(found, path, kind) for path in _expanded(line.strip("[]"))]
+            kind = Columns if line.startswith("[[") else Block
+            places = [_made(found, path, kind) if path else found for path in _expanded(line.strip("[]?"))]
+            for place in places:
+                place.optional = line.endswith("?")
         elif line and not line.startswith("#"):
             keys, form, meaning = line.split(" | ")
             entry = replace(Quantity.of(form, meaning), optional=keys.endswith("?"))
             for path in _expanded(keys.removesuffix("?")):
                 above, _, last = path.rpartition(".")
                 for place in places:
-                    _made(place, above, dict)[last] = entry
+                    (_made(place, above, Block) if above else place)[last] = entry
     return found
 
 
-def _made(above: Block | Columns, path: str, kind: type) -> Block | Columns:
+def _made(above: Block, path: str, kind: type[Block]) -> Block:
     """Return the block or the table below a block, made where it is not there."""
-    place: Block | Columns = above
     *blocks, last = path.split(".")
     for key in blocks:
-        place = place.setdefault(key, {})  # type: ignore[assignment]
-    return place.setdefault(last, kind()) if last else place  # type: ignore[return-value]
+        above = above.setdefault(key, Block())
+    made: Block = above.setdefault(last, kind())
+    return made
 
 
 def _expanded(path: str) -> Iterator[str]:
@@ -94,24 +100,16 @@ def _expanded(path: str) -> Iterator[str]:
 
 
 def block_at(path: str) -> Block:
-    """Return what is described below a block, as ``precision.check``."""
-    place: Block = _everything()
+    """Return what is described below a block, as ``precision.check``, or of a table, as ``precision.along``."""
+    place = _everything()
     for key in path.split("."):
-        place = place[key]  # type: ignore[assignment]
+        place = place[key]
     return place
-
-
-def columns_of(path: str) -> Columns:
-    """Return what the columns of a table are, as of ``strips`` or ``precision.along``."""
-    found = block_at(path)
-    if not isinstance(found, Columns):
-        raise KeyError(path)
-    return found
 
 
 def quantity_at(path: str) -> Quantity | None:
     """Find a key by the keys that lead to it; None for one that is not described."""
     place: object = described()
     for key in path.split("."):
-        place = place.get(key) if isinstance(place, dict) else None
+        place = place.get(key) if isinstance(place, Block) else None
     return place if isinstance(place, Quantity) else None

@@ -32,7 +32,9 @@ WORDS = {
 Wrong = tuple[str, str, str]  # key, what is wrong with it, what is expected there
 
 
-def read(document: Any, file: str, block: Block | None = None, fix: str = "run the project again", *, part: bool = False) -> Document:  # noqa: ANN401, E501 (any JSON)
+def read(
+    document: Document, file: str, block: Block | None = None, fix: str = "run the project again", *, part: bool = False
+) -> Document:
     """Return a document with its tables, from what JSON has in their place.
 
     block: what it holds; without one, a result.
@@ -44,7 +46,14 @@ def read(document: Any, file: str, block: Block | None = None, fix: str = "run t
     if not wrong:
         return found
     raise InputError(
-        Fault(message, "result-value" if expected else "result-incomplete", file, key=key, expected=expected or "a whole result.json", fix=fix)  # noqa: E501
+        Fault(
+            message,
+            "result-value" if expected else "result-incomplete",
+            file,
+            key=key,
+            expected=expected or "a whole result.json",
+            fix=fix,
+        )
         for key, message, expected in wrong[:MOST_FAULTS]
     )
 
@@ -75,7 +84,7 @@ def _block(value: dict[str, Any], block: Block, path: str, wrong: list[Wrong], *
 
 
 def _may_be_missing(entry: Quantity | Block) -> bool:
-    return entry.optional if isinstance(entry, Quantity) else all(map(_may_be_missing, entry.values()))
+    return entry.optional or (isinstance(entry, Block) and bool(entry) and all(map(_may_be_missing, entry.values())))
 
 
 def _table(value: Any, entries: Columns, path: str, wrong: list[Wrong]) -> Table:  # noqa: ANN401 (any JSON)
@@ -116,7 +125,7 @@ def _alike(column: list[Any], entry: Quantity | None) -> bool:
     present = [value for value in column if value is not None]
     if kinds == {str}:
         return _is("".join(present), entry.kind)
-    if kinds == {float} or kinds == {int}:
+    if kinds in ({float}, {int}):
         largest = float(np.abs(np.array(present, float)).max()) if kinds == {float} else max(map(abs, present))
         return _is(largest, entry.kind)
     return not kinds or (kinds == {bool} and entry.kind in {"flag", "any"})

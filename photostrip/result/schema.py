@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from photostrip.result.description import SCHEMA, Block, Columns, Quantity, described
+from photostrip.result.description import SCHEMA, Block, Quantity, described
 
 URI = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {"text": "string", "word": "string", "count": "integer", "flag": "boolean", "number": "number"}

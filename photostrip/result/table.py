@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photostrip.notes import Document
-from photostrip.result.description import Quantity, columns_of
+from photostrip.result.description import Quantity, block_at
 from photostrip.result.numbers import plain
 from photostrip.result.quantities import angle_decimals, coordinate_decimals, rounded_column
 
@@ -33,9 +33,9 @@ class Table:
         self.name = name
         self.quantities = quantities
         self._columns: dict[str, NDArray[Any]] = {}
-        for name, column in columns.items():
-            self._columns[name] = column.view()
-            self._columns[name].setflags(write=False)
+        for key, column in columns.items():
+            self._columns[key] = column.view()
+            self._columns[key].setflags(write=False)
 
     @classmethod
     def of(cls, name: str, columns: Mapping[str, Any]) -> Self:
@@ -43,7 +43,7 @@ class Table:
 
         A column is an array or a list; a text, a flag, a number or None stands in every row.
         """
-        entries = columns_of(name)
+        entries = block_at(name)
         size = next((len(column) for column in columns.values() if _is_column(column)), 0)
         values = {key: column if _is_column(column) else [column] * size for key, column in columns.items()}
         arrays = {
@@ -56,7 +56,7 @@ class Table:
     def of_rows(cls, name: str, rows: Iterable[Mapping[str, Any]]) -> Self:
         """Make a table of a result from its rows; those of none have all columns that a table must have."""
         listed = list(rows)
-        keys = listed[0] if listed else [key for key, entry in columns_of(name).items() if not entry.optional]
+        keys = listed[0] if listed else [key for key, entry in block_at(name).items() if not entry.optional]
         return cls.of(name, {key: [row[key] for row in listed] for key in keys})
 
     @classmethod
@@ -133,14 +133,15 @@ class Table:
         """Return the rows that have these values: ``points.where(role="check")``; of several values one of them."""
         keep = np.ones(len(self), bool)
         for name, value in values.items():
-            wanted = value if isinstance(value, list | tuple | set | frozenset | np.ndarray) else [value]
+            allowed = value if isinstance(value, list | tuple | set | frozenset | np.ndarray) else [value]
             column = self[name].tolist()
-            keep &= np.fromiter((any(each == one for one in wanted) for each in column), bool, len(column))
+            keep &= np.fromiter((each in allowed for each in column), bool, len(column))
         return self[keep]
 
     def with_columns(self, **columns: ArrayLike | None) -> Self:
         """Return the table with other columns in place of its own, or beside them."""
-        return self._with(self._columns | Table.of(self.name, columns)._columns)
+        others = Table.of(self.name, columns)
+        return self._with(self._columns | {key: others[key] for key in others.columns})
 
     def in_frame(self, frame: Document, angles: Document) -> Self:
         """Return the table with the units and decimals of coordinates and angles that its result has."""
@@ -226,7 +227,9 @@ def _unknown(table: str, name: str, known: Sequence[str]) -> KeyError:
     from difflib import get_close_matches
 
     near = get_close_matches(name, known, 1)
-    return KeyError(f"{table} has no column {name!r}; " + (f"did you mean {near[0]!r}?" if near else "it has " + ", ".join(known)))
+    return KeyError(
+        f"{table} has no column {name!r}; " + (f"did you mean {near[0]!r}?" if near else "it has " + ", ".join(known))
+    )
 
 
 def _shown(value: object) -> str:

@@ -49,7 +49,9 @@ def update(result: Path, baseline: Path, allowed: Tolerances | None) -> str:
     text = f"wrote {place}"
     if place.exists():
         try:
-            found = compare_results(document, read_result(str(place), part=True), allowed, (str(file), "the baseline before"))
+            found = compare_results(
+                document, read_result(str(place), part=True), allowed, (str(file), "the baseline before")
+            )
             text += f"; {headline(found)}"
         except InputError:
             text += "; what stood there could not be compared with it"

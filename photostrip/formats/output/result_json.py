@@ -52,6 +52,10 @@ def _has_tables(value: Any) -> bool:  # noqa: ANN401 (any part of a document)
     return isinstance(value, Table) or (isinstance(value, dict) and any(map(_has_tables, value.values())))
 
 
+def on_one_line(value: Any) -> str:  # noqa: ANN401 (any JSON)
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, default=list)
+
+
 def text_of(file: str) -> str:
     """Read the text of a file of JSON."""
     return decode(file, read_bytes(file, LARGEST_RESULT))[0]

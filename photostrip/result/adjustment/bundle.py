@@ -283,9 +283,7 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     return residuals.with_columns(**dict(zip(RELIABILITY, values[at].T, strict=True)))
 
 
-def _foremost(
-    name: str, found: Bundle, shift: float, written: Mapping[str, GroupKind], values: list[Floats]
-) -> Table:
+def _foremost(name: str, found: Bundle, shift: float, written: Mapping[str, GroupKind], values: list[Floats]) -> Table:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
     for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
@@ -297,7 +295,9 @@ def _foremost(
     for _, number, at in sorted(chosen)[:SHOWN]:
         group = found.groups[number]
         place = np.array([divmod(at, group.sigma.shape[1])])
-        rows.append({key: column[0] for key, column in _observed(found, group, place, shift, written[group.kind]).items()})
+        rows.append(
+            {key: column[0] for key, column in _observed(found, group, place, shift, written[group.kind]).items()}
+        )
     return Table.of_rows(f"bundle.reliability.{name}", rows)
 
 

@@ -46,29 +46,40 @@ def frame_of(camera: Document) -> Frame | None:
 def residuals_of(document: Document) -> list[Residual]:
     """Return the image residuals with their places, photo by photo."""
     grid, cameras = DrawnGrid(document), cameras_of(document)
-    photos = {photo["id"]: photo for photo in document["photos"] if photo["rotation"]}
+    photos = {photo["id"]: photo for photo in document["photos"] if rotation_of(photo)}
     points = {point["id"]: point for point in document["points"]}
     found: list[Residual] = []
     for row in document["residuals"]:
         photo, camera = photos.get(row["photo"]), cameras.get(row["photo"])
         if photo is None or camera is None:
             continue
-        unknown = [None] * len(row["points"])
-        tests = row.get("test_x") or unknown, row.get("test_y") or unknown
-        columns = row["points"], row["vx_um"], row["vy_um"], row["used"], *tests
-        for name, vx, vy, used, test_x, test_y in zip(*columns, strict=True):
-            place = _image_of(grid, photo, points.get(name), camera["principal_distance_mm"])
-            if place is None or vx is None or vy is None:
-                continue
-            test = None if test_x is None or test_y is None else (test_x, test_y)
-            found.append(Residual(photo=row["photo"], point=name, place=place, size=(vx, vy), used=used, test=test))
+        place = _image_of(grid, photo, points.get(row["point"]), camera["principal_distance_mm"])
+        if place is None or row["vx_um"] is None or row["vy_um"] is None:
+            continue
+        tests = row.get("test_x"), row.get("test_y")
+        found.append(
+            Residual(
+                photo=row["photo"],
+                point=row["point"],
+                place=place,
+                size=(row["vx_um"], row["vy_um"]),
+                used=row["used"],
+                test=None if None in tests else tests,
+            )
+        )
     return found
+
+
+def rotation_of(photo: Document) -> list[float] | None:
+    """Return the rotation of a photo by rows; None where it is not known."""
+    matrix = [photo[f"r{row}{column}"] for row in (1, 2, 3) for column in (1, 2, 3)]
+    return None if None in matrix else matrix
 
 
 def _image_of(grid: DrawnGrid, photo: Document, point: Document | None, distance: float) -> Pair | None:
     """Return the image of a point; None for one that is not before the camera."""
     if point is None:
         return None
-    m, (x, y, z) = photo["rotation"], grid.seen_from(photo, point)
+    m, (x, y, z) = rotation_of(photo) or [], grid.seen_from(photo, point)
     right, up, back = (m[n] * x + m[n + 3] * y + m[n + 6] * z for n in range(3))
     return (-distance * right / back, -distance * up / back) if back < 0 else None

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.notes import Document
-from photostrip.report.pictures.ground.image_plane import frame_of
+from photostrip.report.pictures.ground.image_plane import frame_of, rotation_of
 from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair, Plan
 from photostrip.report.sections.project import cameras_of
 
@@ -90,19 +90,23 @@ def footprints(document: Document, plan: Plan) -> dict[str, list[Pair]]:
     heights = {row["id"]: grid.up(row) for row in document["points"]}
     places = {spot.id: (spot.along, spot.across, heights[spot.id]) for spot in plan.spots}
     spots = {spot.id: spot for strip in plan.strips for spot in strip}
-    seen = {row["photo"]: [places[name] for name in row["points"] if name in places] for row in document["residuals"]}
+    seen: dict[str, list[tuple[float, float, float]]] = {}
+    for row in document["residuals"]:
+        if row["point"] in places:
+            seen.setdefault(row["photo"], []).append(places[row["point"]])
     points, found = np.array(sorted(places.values())), {}
     for photo in document["photos"]:
         camera, own = cameras.get(photo["id"]), seen.get(photo["id"])
         frame = frame_of(camera) if camera else None
-        if camera is None or frame is None or not own or not photo["rotation"]:
+        rotation = rotation_of(photo)
+        if camera is None or frame is None or not own or rotation is None:
             continue
         centre = np.array((spots[photo["id"]].along, spots[photo["id"]].across, grid.up(photo)))
         # the rms distance, not that of the middle: some point always is that near to it
         reach = math.sqrt(np.mean(np.sum((np.array(own) - centre) ** 2, axis=1)))
         terrain = TerrainModel.around(np.mean(own, axis=0), reach, points)
         distance = camera["principal_distance_mm"]
-        axes = _image_axes(grid, plan, photo["rotation"])
+        axes = _image_axes(grid, plan, rotation)
         rays = np.array([(*corner, -distance) for corner in frame.corners]) @ axes
         border = _divided(_descending(terrain, rays, LOWEST_RAY * distance))
         if len(border) and terrain.height_of(centre) > 0:

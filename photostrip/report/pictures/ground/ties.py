@@ -32,10 +32,10 @@ class Tie(NamedTuple):
 def tie_pictures(document: Document, plan: Plan) -> list[Picture]:
     """Draw photos, or strips where there are many photos, tied by common points."""
     strip_of = {photo["id"]: photo["strip"] for photo in document["photos"]}
-    on = {
-        row["photo"]: [p for p, used in zip(row["points"], row["used"], strict=True) if used]
-        for row in document["residuals"]
-    }
+    on: dict[str, list[str]] = {}
+    for row in document["residuals"]:
+        if row["used"]:
+            on.setdefault(row["photo"], []).append(row["point"])
     places = {spot.id: (spot.along, spot.across) for strip in plan.strips for spot in strip}
     whole = len(places) > MOST_PHOTOS and len(set(strip_of.values())) > 1
     if whole:

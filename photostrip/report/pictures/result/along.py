@@ -76,7 +76,7 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
 def _strips(document: Document, plan: Plan) -> list[Strip]:
     names = [strip["id"] for strip in document["strips"]] or [""]
     members = {row["id"]: row["strips"] for row in document["control"] if row["measured"]}
-    polynomials = {block["strip"]: block for block in document.get("polynomials", [])}
+    polynomials = polynomials_of(document)
     spots = {spot.id: spot for spot in plan.spots}
     found = []
     for name, flown in zip(names, plan.strips, strict=False):
@@ -109,9 +109,17 @@ def _misclosed(plan: Plan, course: Course, row: Document) -> tuple[float | None,
     return _parts(course, plan.turned(row["east"], row["north"]) if known else None, row["up"])
 
 
+def polynomials_of(document: Document) -> dict[str, Document]:
+    """Return the polynomial of each strip, its terms with their coefficients under each axis."""
+    found = {row["strip"]: {**row, **{axis: {} for axis in KEYS}} for row in document.get("polynomials", [])}
+    for row in document.get("polynomial_terms", []):
+        found[row["strip"]][row["axis"]][row["term"]] = row["coefficient"]
+    return found
+
+
 def polynomial_at(block: Document, axis: str, x: float) -> float:
     total = 0.0
-    for term, coefficient in zip(block["terms"][axis], block["coefficients"][axis], strict=True):
+    for term, coefficient in block[axis].items():
         found = re.fullmatch(r"(?:1|X(?:\^(\d))?)", term)
         if found:  # the others vanish where Y is 0
             total += coefficient * x ** (0 if term == "1" else int(found[1] or 1))
@@ -125,7 +133,7 @@ def polynomial_entry(document: Document) -> Entry:
 
 def origin_of(block: Document, places: Sequence[float]) -> float:
     """Return X of the first photo: the range of the control is known in X and on the plan."""
-    return float(block["reach"][0]) - min(places)
+    return float(block["reach_from"]) - min(places)
 
 
 def _curves(block: Document | None, before: Sequence[Uncorrected], ends: Pair) -> dict[str, list[Pair]]:
@@ -137,7 +145,7 @@ def _curves(block: Document | None, before: Sequence[Uncorrected], ends: Pair) -
     return {
         axis: [(at, -polynomial_at(block, key, at + start)) for at in places]
         for axis, key in zip(AXES, KEYS, strict=True)
-        if block["terms"][key]
+        if block[key]
     }
 
 

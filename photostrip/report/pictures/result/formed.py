@@ -10,7 +10,7 @@ from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, framed, framed_by_photos, legend, multiples, span, steps
 from photostrip.report.pictures.ground.plan_view import Dot, DrawnGrid, Pair, Plan, course_of
-from photostrip.report.pictures.result.along import origin_of, polynomial_at, polynomial_entry
+from photostrip.report.pictures.result.along import origin_of, polynomial_at, polynomial_entry, polynomials_of
 from photostrip.report.pictures.svg import Picture
 
 SHAPES = {"along": "dot", "across": "square", "up": "triangle"}
@@ -22,7 +22,7 @@ MOST_MARKS = 600  # on a picture; more are lines without them
 def junction_pictures(document: Document) -> list[Picture]:
     """Draw what neighbouring models differ by at the points that they have in common."""
     rows = document["junctions"] or document.get("links", [])
-    rows = [row for row in rows if row["discrepancy_um"]["along"] is not None]
+    rows = [row for row in rows if row["discrepancy_um_along"] is not None]
     if not rows:
         return []
     sizes: dict[str, float] = {}
@@ -35,7 +35,7 @@ def junction_pictures(document: Document) -> list[Picture]:
         panel = shown.layout.panel(place, (0.0, len(own) + 1.0), high)
         drawn += framed_by_photos(panel, [row["photo"] for row in own], ("photo", "µm"), shown.titled(strip))
         for name, kind in KINDS.items():
-            values = [(n, row["discrepancy_um"][name]) for n, row in enumerate(own, 1)]
+            values = [(n, row[f"discrepancy_um_{name}"]) for n, row in enumerate(own, 1)]
             drawn.append(steps(panel, values, f"curve curve-{kind} thin"))
             for n, size in values if marked else ():
                 hint = f"photo {own[n - 1]['photo']}, {name}: {size:.1f} µm"
@@ -52,7 +52,7 @@ def junction_pictures(document: Document) -> list[Picture]:
 
 
 def _gap(row: Document) -> float:
-    return float(max(row["discrepancy_um"].values()))
+    return float(max(row[f"discrepancy_um_{name}"] for name in KINDS))
 
 
 def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
@@ -120,8 +120,8 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
 
 def _polynomial(document: Document, plan: Plan, strip: str, values: Sequence[Pair]) -> list[Pair]:
     """Return the change of scale by the polynomial at each base, ppm from its mean."""
-    block = next((each for each in document.get("polynomials", []) if each["strip"] == strip), None)
-    if block is None or not block["terms"]["x"]:
+    block = polynomials_of(document).get(strip)
+    if block is None or not block["x"]:
         return []
     number = [each["id"] for each in document["strips"]].index(strip)
     course, spots = course_of(plan.strips[number]), {spot.id: spot for spot in plan.spots}

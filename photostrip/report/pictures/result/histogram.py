@@ -72,12 +72,7 @@ def rms(values: Sequence[float]) -> float:
 def _parallaxes(document: Document) -> list[Sample]:
     """Return the y parallaxes of the points used, with the limits of their pairs; nothing without either."""
     limits = [row["limit_um"] for row in document["models"] if row.get("limit_um") is not None]
-    values = [
-        size
-        for row in document["parallaxes"]
-        for size, used in zip(row["q_um"], row["used"], strict=True)
-        if used and size is not None
-    ]
+    values = [row["q_um"] for row in document["parallaxes"] if row["used"] and row["q_um"] is not None]
     if not limits or not values:
         return []
     return [_sample("y parallaxes of the pairs", values, "µm", rms(values), limits)]

@@ -29,15 +29,17 @@ class Parallax(NamedTuple):
 def parallax_pictures(document: Document) -> list[Picture]:
     """Draw the y parallaxes; nothing where none are known."""
     zones: dict[int, list[Parallax]] = {zone: [] for zone in ZONES}
-    for pair, row in enumerate(document["parallaxes"], 1):
-        names = f"{row['left']} – {row['right']}"
-        for point, size, used, zone in zip(row["points"], row["q_um"], row["used"], row["zone"], strict=True):
-            if size is not None and zone in zones:
-                zones[zone].append(Parallax(pair=pair, names=names, point=point, size=size, used=used))
+    rows = [row for row in document["models"] if "zone_1" in row]  # of photos
+    number = {(row["strip"], row["left"]): pair for pair, row in enumerate(rows, 1)}
+    for row in document["parallaxes"]:
+        if row["q_um"] is not None and row["zone"] in zones:
+            pair, names = number[row["strip"], row["left"]], f"{row['left']} – {row['right']}"
+            zones[row["zone"]].append(
+                Parallax(pair=pair, names=names, point=row["point"], size=row["q_um"], used=row["used"])
+            )
     everything = [each for zone in zones.values() for each in zone]
     if not everything:
         return []
-    rows = document["parallaxes"]
     pairs, lefts = len(rows), [row["left"] for row in rows]
     limit = _limit([each for each in everything if each.used] or everything)
     layout = Layout(columns=2, height=130.0, number=len(ZONES))

@@ -74,7 +74,7 @@ def position_pictures(document: Document) -> list[Picture]:
     if not rows:
         return []
     sizes = [abs(row[key]) for row in rows for key, _ in POSITIONS if row[key] is not None]
-    sizes += [SIGMAS * sigma for row in rows for sigma in row["sigma"] if sigma is not None]
+    sizes += [SIGMAS * sigma for row in rows for _, name in POSITIONS if (sigma := row[f"sigma_{name}"]) is not None]
     reach = max(sizes, default=1.0) * 1.08
     layout = Layout(columns=1, height=120.0, number=len(POSITIONS))
     drawn: list[str] = []
@@ -83,7 +83,7 @@ def position_pictures(document: Document) -> list[Picture]:
         panel = layout.panel(place, (0.0, len(rows) + 1.0), (-reach, reach))
         drawn += framed_by_photos(panel, [row["photo"] for row in rows], ("photo", "m"), name)
         for n, row in enumerate(rows, 1):
-            size, sigma = row[key], row["sigma"][place]
+            size, sigma = row[key], row[f"sigma_{name}"]
             if size is None:
                 continue
             if sigma is not None and single:
@@ -104,7 +104,7 @@ def position_pictures(document: Document) -> list[Picture]:
 def correlation_pictures(document: Document) -> list[Picture]:
     """Draw how far the parameters of a self-calibration are told apart, camera by camera."""
     rows: list[Document] = document.get("bundle", {}).get("calibration") or []
-    known = [row for row in rows if row.get("correlations")]
+    known = [row for row in rows if row["correlations"]]
     if len(known) <= 1:
         return []
     single = len({row["camera"] for row in known}) == 1
