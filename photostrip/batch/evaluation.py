@@ -56,8 +56,8 @@ def _computed(task: Task, source: Source) -> Answer:
     with reading_from(source):
         project = loaded_from(Path(task.project), task.overrides)
         result = project.run()
-        files = exported(result.in_tables, project.loaded.completed.export).files | result.files(html=task.html)
-    outcome = outcome_of(result.in_tables, result_findings(result.in_tables)) | _place_of(result)
+        files = exported(result.document, project.loaded.completed.export).files | result.files(html=task.html)
+    outcome = outcome_of(result.document, result_findings(result.document)) | _place_of(result)
     return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project.loaded, source))
 
 
@@ -78,7 +78,7 @@ def _place_of(result: Result) -> Document:
     found = result.computed
     if found is None or found.output.kind == "local":
         return {"body": None, "track": None}
-    frame, photos = found.output, result.in_tables["photos"]
+    frame, photos = found.output, result.document["photos"]
     strips: dict[str, list[Document]] = {}
     for photo in photos:
         strips.setdefault(photo["strip"], []).append(photo)

@@ -13,7 +13,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.comparison.ground import difference_in_plan_and_height, plan_and_height
-from photostrip.comparison.members import members_of, missing_and_new
+from photostrip.comparison.members import LEFT_OUT, members_of, missing_and_new
 from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
@@ -23,17 +23,6 @@ from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 from photostrip.result.table import Table
 
 SCHEMA = 1
-# What is ours, what the other numbers are made of, and what is made of them.
-LEFT_OUT = (
-    "version",
-    "statement",
-    "certificate",
-    "residuals",
-    "parallaxes",
-    "link_residuals",
-    "covariances",
-    "fiducial_marks",
-)
 RECORDS_IN_SETS = {
     "photos",
     "points",

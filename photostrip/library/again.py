@@ -38,7 +38,7 @@ def compare_again(result: Path, project: Path | None = None, tolerances: Toleran
     if place is None:
         raise InputError(Fault("its project is not found beside it", "no-project", file, fix="name it with --project"))
     with reading_from(Source()) as account:
-        again = loaded_from(place, certificate["set"]).run().in_tables
+        again = loaded_from(place, certificate["set"]).run().document
     now = again["certificate"]
     grids = {each["file"]: each["sha256"] for each in now["grids"]}
     files = [

@@ -11,8 +11,9 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
+from photostrip.formats.output.result_json import checked
 from photostrip.notes import Document, named
-from photostrip.result.table import plain_of
+from photostrip.result import table
 
 if TYPE_CHECKING:
     from photostrip.formats.text.writing import Content
@@ -39,47 +40,38 @@ class Result:
         read: Sequence[str | PathLike[str]] = (),
         exports: Sequence[str] = (),
     ) -> None:
-        self._document = document
+        self.document: Document = document if not isinstance(document["points"], dict) else _checked(document)
+        """The content of result.json: blocks of keys, and tables; ``document["points"]["x"]`` is an array."""
         self._read = read
         self.computed = computed
         """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
         self._resolved = resolved
         self._exports = exports
 
-    @cached_property
-    def document(self) -> Document:
-        """The content of result.json: plain dictionaries, lists, texts and numbers; tables as blocks of columns."""
-        return dict(plain_of(self._document))
-
-    @property
-    def in_tables(self) -> Document:
-        """The same with its tables, as it is printed and written: a fifth of the memory."""
-        return self._document
-
     @property
     def name(self) -> str:
         """Name of the project."""
-        return str(self._document["name"])
+        return str(self.document["name"])
 
     @property
     def status(self) -> str:
         """The verdict in one word: good, unverified, look or failed."""
-        return str(self._document["status"])
+        return str(self.document["status"])
 
     @property
     def crs(self) -> str:
         """Reference system of all ground coordinates, as a project has it: a code, a PROJ string, WKT, or local."""
-        return str(self._document["frame"]["crs"])
+        return str(self.document["frame"]["crs"])
 
     @property
     def accuracy(self) -> str:
         """How good the points are, in one sentence."""
-        return str(self._document["verdict"]["accuracy"])
+        return str(self.document["verdict"]["accuracy"])
 
     @property
     def summary(self) -> Document:
         """Sigma0, scales, and the differences at control and check points."""
-        return dict(self._document["summary"])
+        return dict(self.document["summary"])
 
     @cached_property
     def points(self) -> Table:
@@ -134,8 +126,8 @@ class Result:
     def _table(self, name: str) -> Table:
         from photostrip.library.table import Table
 
-        table = self._document[name]
-        return Table(name, {key: table[key] for key in table.columns}, table.quantities, self._document["frame"])
+        table = self.document[name]
+        return Table(name, {key: table[key] for key in table.columns}, table.quantities, self.document["frame"])
 
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
@@ -194,14 +186,14 @@ class Result:
         if form == "json":
             from photostrip.formats.output.result_json import to_json
 
-            return to_json(self._document)
+            return to_json(self.document)
         if unknown := sorted(set(sections) - set(SectionName)):
             message = f"the report has no section {', '.join(unknown)}"
             raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
         if self.computed is not None:
-            return _rendered(self._document, form, sections, everything=everything)
-        with faults_of_edited("reported", (self._document, self.name)):
-            document = as_reported(self._document, self.name)
+            return _rendered(self.document, form, sections, everything=everything)
+        with faults_of_edited("reported", (self.document, self.name)):
+            document = as_reported(self.document, self.name)
             sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
             return _rendered(document, form, sections, everything=everything)
 
@@ -216,7 +208,7 @@ class Result:
         """
         from photostrip.result.statement.accuracy_statement import statement_document
 
-        return statement_document(self._document, self.name, classes_cm)
+        return statement_document(self.document, self.name, classes_cm)
 
     def trace(self, form: str = "text") -> str:
         """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.
@@ -247,21 +239,21 @@ class Result:
         from photostrip.formats.output.result_files import beside_json
         from photostrip.formats.output.result_json import json_pieces
 
-        tables = beside_json(self._document, self._resolved, self.computed)
-        return tables | {RESULT: json_pieces(self._document)}
+        tables = beside_json(self.document, self._resolved, self.computed)
+        return tables | {RESULT: json_pieces(self.document)}
 
     def _exported(self) -> dict[str, str | bytes]:
         if not self._exports:
             return {}
         from photostrip.foreign.exports import exported
 
-        return exported(self._document, self._exports).files
+        return exported(self.document, self._exports).files
 
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
         from photostrip.report.pictures.result.pictures import picture_files
 
-        return picture_files(self._document)
+        return picture_files(self.document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
@@ -298,7 +290,7 @@ class Result:
 
         rows = []
         for role in ("control", "check"):
-            found: Document = self._document["summary"].get(role) or {}
+            found: Document = self.document["summary"].get(role) or {}
             for part in ("plan", "height"):
                 each = found.get(part)
                 if each and each.get("count"):
@@ -322,6 +314,12 @@ def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, 
     chosen = chosen_sections(document, names=names, everything=everything, width=layout.USUAL)
     title = "" if sections else title_of(document)
     return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
+
+
+def _checked(document: Document) -> Document:
+    from photostrip.formats.output.result_json import checked
+
+    return checked(document, "the result")
 
 
 def _require_form(form: str, known: Sequence[str]) -> None:

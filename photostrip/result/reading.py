@@ -6,7 +6,7 @@ every number is finite and every text can be written. Keys that are not describe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import chain, islice
 from typing import Any
 
@@ -33,16 +33,20 @@ Wrong = tuple[str, str, str]  # key, what is wrong with it, what is expected the
 
 
 def read(
-    document: Document, file: str, block: Block | None = None, fix: str = "run the project again", *, part: bool = False
+    document: Document,
+    file: str,
+    block: Block | None = None,
+    fix: str = "run the project again",
+    lacking: Collection[str] = (),
 ) -> Document:
     """Return a document with its tables, from what JSON has in their place.
 
     block: what it holds; without one, a result.
-    part: whether whole blocks and tables may be missing, as from a baseline.
+    lacking: blocks and tables that may be missing, as from a baseline.
     Raises InputError with every key that is missing or has a value of another kind, the first of many.
     """
     wrong: list[Wrong] = []
-    found = _block(document, described() if block is None else block, "", wrong, part=part)
+    found = _block(document, described() if block is None else block, "", wrong, lacking)
     if not wrong:
         return found
     raise InputError(
@@ -58,7 +62,9 @@ def read(
     )
 
 
-def _block(value: dict[str, Any], block: Block, path: str, wrong: list[Wrong], *, part: bool) -> Document:
+def _block(
+    value: dict[str, Any], block: Block, path: str, wrong: list[Wrong], lacking: Collection[str] = ()
+) -> Document:
     """Return a block with the tables in it; what is wrong goes to a list."""
     found: Document = {}
     for key, below in value.items():
@@ -69,8 +75,8 @@ def _block(value: dict[str, Any], block: Block, path: str, wrong: list[Wrong], *
             found[key] = _table(below, entry, here, wrong)
         elif isinstance(entry, dict):
             if isinstance(below, dict):
-                found[key] = _block(below, entry, here, wrong, part=part)
-            elif below is None:
+                found[key] = _block(below, entry, here, wrong)
+            elif below is None and entry.optional:
                 found[key] = below
             else:
                 wrong.append((here, f"holds {_shown(below)}", "a block of keys"))
@@ -78,7 +84,7 @@ def _block(value: dict[str, Any], block: Block, path: str, wrong: list[Wrong], *
             wrong.extend(islice(_wrong_value(below, entry, here), MOST_FAULTS))
             found[key] = below
     for key, entry in block.items():
-        if key not in value and not part and not _may_be_missing(entry):
+        if key not in value and key not in lacking and not _may_be_missing(entry):
             wrong.append((f"{path}.{key}" if path else key, "is missing", ""))
     return found
 

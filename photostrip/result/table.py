@@ -115,9 +115,11 @@ class Table:
         for row in zip(*map(self.values, self._columns), strict=True):
             yield dict(zip(self._columns, row, strict=True))
 
-    def __contains__(self, name: object) -> bool:
-        """Say whether there is a column of this name."""
-        return name in self._columns
+    def __eq__(self, other: object) -> bool:
+        """Say whether the rows are the same, as those of a table or of a list."""
+        return isinstance(other, Table | list) and list(self) == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def values(self, name: str, rows: slice = slice(None)) -> list[Any]:
         """Return a column as a list, None where there is no value."""
@@ -234,6 +236,10 @@ def _unknown(table: str, name: str, known: Sequence[str]) -> KeyError:
 
 def _shown(value: object) -> str:
     return "" if value is None else f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[Document]:
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def plain_of(value: Any) -> Any:  # noqa: ANN401 (any part of a document)

@@ -90,7 +90,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             pictures = result.pictures()
             write_files(plots, pictures)
             messages.say(f"wrote {len(pictures)} pictures to {plots}")
-    print_result(result.in_tables, form, width, Parts(quiet, verbose, section or ()))
+    print_result(result.document, form, width, Parts(quiet, verbose, section or ()))
     return exit_code(result.status, strict=strict)
 
 

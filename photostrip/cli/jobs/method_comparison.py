@@ -47,7 +47,7 @@ def compare_methods(
                 failures.append(error)
                 continue
             name = result.name
-            found[adjustment] = method_of(result.in_tables)
+            found[adjustment] = method_of(result.document)
             if output is not None:
                 result.write(output / adjustment, html=html)
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")

@@ -22,6 +22,8 @@ ODD = re.compile(r'[",\s]')  # without these no text of a column needs quotes
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
 LINES = 8000  # that are written at a time: all together take more memory than the result
 IDS = {"points": "point", "control": "point", "ties": "point", "not_determined": "point", "photos": "photo"}
+# Tables whose files have other names: these are those of measured and given coordinates, and may stand beside them.
+FILES = {"control": "given_points", "fiducials": "interior", "models": "pairs"}
 WORDS = {"findings", "notes", "tolerances"}  # tables that hold no measurements
 
 
@@ -32,7 +34,7 @@ def beside_json(document: Document, resolved: str, result: Result | None) -> dic
     `resolved` is the text of project.resolved.yaml, not written when it is empty.
     """
     files: dict[str, Iterable[str]] = {
-        f"{name}.csv": csv_pieces(table, _names(name, document["angles"]))
+        f"{FILES.get(name, name)}.csv": csv_pieces(table, _names(name, document["angles"]))
         for name, table in document.items()
         if isinstance(table, Table) and name not in WORDS and (len(table) or name == "rejected")
     }

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
+from photostrip.comparison.members import LEFT_OUT
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.notes import Document
@@ -77,13 +78,21 @@ def parsed(file: str) -> Any:  # noqa: ANN401 (any JSON)
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
 
 
-def read_result(file: str, *, part: bool = False) -> Document:
-    """Read a result.json, or raise what keeps it from being one; of a baseline whole blocks may be missing."""
-    return checked(parsed(file), file, part=part)
+def read_result(file: str) -> Document:
+    """Read a result.json, or raise what keeps it from being one."""
+    return checked(parsed(file), file)
 
 
-def checked(document: Any, file: str, *, part: bool = False) -> Document:  # noqa: ANN401 (any JSON)
-    """Return a result with its tables from what JSON has of it, or raise what keeps it from being one."""
+def read_baseline(file: str) -> Document:
+    """Read a result.json or what is kept of one as a baseline."""
+    return checked(parsed(file), file, LEFT_OUT)
+
+
+def checked(document: Any, file: str, lacking: Collection[str] = ()) -> Document:  # noqa: ANN401 (any JSON)
+    """Return a result with its tables from what JSON has of it, or raise what keeps it from being one.
+
+    lacking: blocks that it may lack.
+    """
     if not isinstance(document, dict) or "photostrip_result" not in document:
         refuse(file, "result-kind", "has no key `photostrip_result`", expected="a result.json of photostrip")
     if document["photostrip_result"] != SCHEMA:
@@ -95,7 +104,7 @@ def checked(document: Any, file: str, *, part: bool = False) -> Document:  # noq
             fix="run the project again with this version of photostrip",
         )
     try:
-        whole = read(document, file, part=part)
+        whole = read(document, file, lacking=lacking)
     except RecursionError:
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
     return in_frame(whole)

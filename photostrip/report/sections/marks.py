@@ -60,8 +60,8 @@ def _length(mark: Document) -> float:
 def _marks(document: Document) -> Iterator[Document]:
     """Give the rays of given points, photo by photo, with their residuals."""
     roles = {row["id"]: row["role"] for row in document["control"]}
-    cameras, residuals = cameras_of(document), document["residuals"]
-    for row in residuals.where(point=set(roles)):
+    cameras = cameras_of(document)
+    for row in document["residuals"].where(point=set(roles)) if "residuals" in document else ():  # not of a baseline
         x, y = row["vx_um"], row["vy_um"]
         if x is None or y is None:
             continue

@@ -14,7 +14,7 @@ from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.points import ControlPoints
 from photostrip.result.numbers import EXACT, PER_RADIAN, rounded, significant
-from photostrip.result.records import as_records
+from photostrip.result.table import rows_of
 from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.strip import absolute_orientation
@@ -158,7 +158,7 @@ def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
         **dict(zip("XYZ", rounded(formed.model_xyz[rows].T, MODEL), strict=True)),
         "used": (pairs.weight > 0).tolist(),
     }
-    return as_records(columns)
+    return rows_of(columns)
 
 
 def _chain(strip: StripResult, factor: float) -> list[Document]:
@@ -205,7 +205,7 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
             {
                 "photo": strip.strip.photos[number + 1],
                 "form": result.settings.formation.scale_transfer,
-                "points": as_records(points),
+                "points": rows_of(points),
                 "k": rounded(factor * formed.scale_factor[number], MODEL),
                 "sd_of_one": rounded(joined.spread[number] * factor * formed.scale_factor[number], MODEL),
             }
@@ -235,7 +235,7 @@ def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
         **_similarity(similarity, factor),
         "approximate": _approximate(strip.control, points, given, similarity.scale),
         "sigma0": significant(strip.absolute.sigma0),
-        "control": as_records(control),
+        "control": rows_of(control),
     }
 
 
@@ -255,7 +255,7 @@ def _approximate(control: ControlPoints, points: Floats, given: Floats, scale: f
     }
     return {
         "centroid": rounded(points[full].mean(axis=0), MODEL),
-        "pairs": as_records(pairs) if len(full) <= PAIRED else [],
+        "pairs": rows_of(pairs) if len(full) <= PAIRED else [],
         "r": significant(found.mean, RATIO),
         "t": significant(scale / found.mean, RATIO),
     }
@@ -315,4 +315,4 @@ def _polynomial(result: Result, strip: StripResult) -> Document | None:
         }
         for each in found.evidence
     ]
-    return {"degree": found.degree, "evidence": evidence, "axes": axes, "control": as_records(control)}
+    return {"degree": found.degree, "evidence": evidence, "axes": axes, "control": rows_of(control)}

@@ -14,12 +14,12 @@ import pytest
 from photostrip.report.pictures.ground.footprints import footprint_pictures
 from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
-from photostrip.result.records import as_lists
+from photostrip.result.quantities import MATRIX
 from photostrip.simulation.ground import surface
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Ground, Image, Spec, Terrain
 from tests.loops import nonempty
-from tests.results import Document, solved
+from tests.results import Document, by_rows, in_tables, rotation, solved
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -45,11 +45,12 @@ def flown(terrain: Terrain, seed: int = 1, sigma_um: float = 5.0) -> tuple[Simul
         image=Image(sigma_um),
     )
     simulation = simulate(spec)
-    return simulation, as_lists(solved(inputs_of(simulation)).document)
+    return simulation, by_rows(solved(inputs_of(simulation)).document)
 
 
 def on_ground(document: Document) -> dict[str, NDArray[np.float64]]:
     """Return the footprints as east and north."""
+    document = in_tables(document)
     plan = plan_of(document)
     first = document["photos"][0]
     cosine, sine = (plan.turned(1.0, 0.0)[0], plan.turned(0.0, 1.0)[0])
@@ -66,8 +67,8 @@ def borders(simulation: Simulation) -> dict[str, NDArray[np.float64]]:
     side = np.stack([along, np.full(4, -0.5)], axis=1)
     quarter = np.array([[0.0, 1.0], [-1.0, 0.0]])
     frame = 230.0 * np.concatenate([side @ np.linalg.matrix_power(quarter, n) for n in range(4)])
-    for photo, centre, rotation in zip(truth.photo_ids, truth.centers, truth.rotations, strict=True):
-        rays = np.column_stack([frame, np.full(len(frame), -DISTANCE)]) @ rotation.T
+    for photo, centre, turn in zip(truth.photo_ids, truth.centers, truth.rotations, strict=True):
+        rays = np.column_stack([frame, np.full(len(frame), -DISTANCE)]) @ turn.T
         scale = np.linspace(0.3, 2.0, 4000)[:, None, None] * (centre[2] - heights.height) / DISTANCE
         places = centre + scale * rays
         below = places[..., 2] <= heights(places[..., 0], places[..., 1])
@@ -90,7 +91,9 @@ def test_borders_of_photos_lie_on_the_ground(terrain: Terrain, allowed: float, l
     errors, others = [], []
     simulation, document = flown(terrain, 1)
     points = {point["id"]: point["z"] for point in document["points"]}
-    seen = {row["photo"]: [points[name] for name in row["points"]] for row in document["residuals"]}
+    seen: dict[str, list[float]] = {}
+    for row in document["residuals"]:
+        seen.setdefault(row["photo"], []).append(points[row["point"]])
     true, found = borders(simulation), on_ground(document)
     assert set(found) == set(true)
     for photo in nonempty(document["photos"]):
@@ -115,7 +118,7 @@ def turned(document: Document, number: int, degrees: float) -> Document:
     """Return a result one of whose photos looks up to the left by an angle."""
     made = copy.deepcopy(document)
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    made["photos"][number]["rotation"] = [1, 0, 0, 0, cosine, -sine, 0, sine, cosine]
+    made["photos"][number].update(zip(MATRIX, [1, 0, 0, 0, cosine, -sine, 0, sine, cosine], strict=True))
     return made
 
 
@@ -125,7 +128,7 @@ def test_oblique_photos_show_the_ground_before_the_horizon(tilt: float) -> None:
     made = turned(document, 2, tilt)
     photo = made["photos"][2]
     way = np.array([[*place, 300.0] for place in on_ground(made)[photo["id"]]]) - [photo[axis] for axis in "xyz"]
-    image = way @ np.array(photo["rotation"]).reshape(3, 3)
+    image = way @ rotation(photo)
     image = -DISTANCE * image[:, :2] / image[:, 2:]
     steep = -way[:, 2] / np.linalg.norm(way, axis=1)
     # the upper border, unless rays of it do not come down: then the line below the horizon
@@ -156,11 +159,11 @@ def test_photos_that_show_no_ground_have_no_footprint() -> None:
 def test_few_points_tell_of_the_height(count: int) -> None:
     _, document = flown(Terrain(relief=60.0))
     made = copy.deepcopy(document)
-    row = made["residuals"][2]
-    kept = row["points"][:count]
+    third = made["photos"][2]["id"]
+    kept = [row["point"] for row in made["residuals"] if row["photo"] == third][:count]
     made["points"] = [point for point in made["points"] if point["id"] in kept]
     found = on_ground(made)
-    assert row["photo"] in found
+    assert third in found
     for photo, outline in nonempty(found.items()):
         extent = np.ptp(outline, axis=0)
         assert extent == pytest.approx((SIDE, SIDE), rel=0.1), photo  # hills of 60 m from 1530 m, tilts of 1 degree
@@ -172,8 +175,9 @@ def test_the_overlap_is_counted_within_the_outlines() -> None:
     made = copy.deepcopy(document)
     first = made["photos"][0]
     made["photos"] = [first, first | {"id": "again"}, *made["photos"][1:]]
-    made["residuals"].append(made["residuals"][0] | {"photo": "again"})
+    made["residuals"] += [row | {"photo": "again"} for row in made["residuals"] if row["photo"] == first["id"]]
     made["photos"], made["strips"] = made["photos"][:2], made["strips"][:1]
+    made = in_tables(made)
     drawn = footprint_pictures(made, plan_of(made))[0].svg
     assert 'class="overlap overlap-2"' in drawn
     assert drawn.count('class="overlap overlap-1"') == 1  # of the legend
@@ -186,7 +190,8 @@ def test_straight_sides_lose_their_corners() -> None:
 
 def test_ids_stand_in_footprints_that_have_room_for_them() -> None:
     _, document = flown(Terrain(relief=0.0))
-    (picture,) = footprint_pictures(document, plan_of(document))
+    shown = in_tables(document)
+    (picture,) = footprint_pictures(shown, plan_of(shown))
     assert len(re.findall(r'class="label id"', picture.svg)) == len(document["photos"])
     assert 'class="outline"' in picture.svg
     longer = copy.deepcopy(dict(document))
@@ -194,6 +199,7 @@ def test_ids_stand_in_footprints_that_have_room_for_them() -> None:
         photo["id"] = "p" * 60 + photo["id"]
     for row in longer["residuals"]:
         row["photo"] = "p" * 60 + row["photo"]
-    (picture,) = footprint_pictures(longer, plan_of(longer))
+    shown = in_tables(longer)
+    (picture,) = footprint_pictures(shown, plan_of(shown))
     assert 'class="label id"' not in picture.svg
     assert 'class="outline narrow"' in picture.svg

@@ -15,7 +15,7 @@ from photostrip.report.html import to_html
 from photostrip.report.pictures.result.pictures import pictures_of
 from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
-from tests.results import Document, solved, spec
+from tests.results import Document, by_rows, in_tables, solved, spec
 from tests.simulated import inputs_of
 
 
@@ -42,11 +42,11 @@ def test_models_without_centres_have_a_plan_of_their_points() -> None:
 
 
 def test_a_strip_in_which_one_centre_is_not_known_is_drawn_without_it() -> None:
-    found = dict(document(centers=True))
+    found = by_rows(document(centers=True))
     found["photos"] = [
         {**photo, "x": None, "y": None, "z": None} if n == 0 else photo for n, photo in enumerate(found["photos"])
     ]
-    drawn = {each.name: each.svg for each in pictures_of(found)}
+    drawn = {each.name: each.svg for each in pictures_of(in_tables(found))}
     assert f"photo {found['photos'][1]['id']}" in drawn["plan"]
     assert f">photo {found['photos'][0]['id']}" not in drawn["plan"]
 

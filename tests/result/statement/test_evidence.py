@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +14,7 @@ from photostrip.result.statement.accuracy_statement import exit_code, statement_
 from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.statement.stating import stated
-from tests.results import Case, case
+from tests.results import Case, by_rows, case, in_tables
 
 GOOD = {"count": 30, "rmse": 0.106, "survey": 0.0424, "accuracy": 0.1141, "class_cm": 12, "mean": 0.09, "p90": 0.16}
 
@@ -34,7 +33,8 @@ def block(**parts: Any) -> dict[str, Any]:  # noqa: ANN401
 
 
 def of(given: Case, **changed: Any) -> dict[str, Any]:  # noqa: ANN401
-    found: dict[str, Any] = statement_of(given.result, differences(given.result), given.document | changed)
+    document = in_tables(given.document | changed)
+    found: dict[str, Any] = statement_of(given.result, differences(given.result), document)
     return found
 
 
@@ -104,7 +104,7 @@ def test_a_result_without_check_points_is_refused() -> None:
     without = replace(control, check=np.zeros(len(control), bool))
     result = replace(given.result, inputs=replace(given.result.inputs, control=without))
     rows = [row | {"role": "control"} for row in given.document["control"]]
-    found = statement_of(result, differences(given.result), given.document | {"control": rows})
+    found = statement_of(result, differences(given.result), in_tables(given.document | {"control": rows}))
     assert reasons(found) == {"statement-no-check-points"}
     assert found["sentences"] == []
     assert found["plan"]["accuracy"] is None
@@ -149,7 +149,7 @@ def test_the_same_points_give_the_same_figures_in_every_frame(frame: str) -> Non
 
 def certified(document: dict[str, Any]) -> dict[str, Any]:
     """Give a document as it is read again, with the hash of its numbers."""
-    found: dict[str, Any] = json.loads(json.dumps(document, default=list))
+    found: dict[str, Any] = in_tables(by_rows(document))
     return found | {"certificate": {"result_sha256": result_hash(found)}}
 
 
