@@ -13,7 +13,6 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.result_json import checked
 from photostrip.notes import Document, named
-from photostrip.result import table
 
 if TYPE_CHECKING:
     from photostrip.formats.text.writing import Content
@@ -317,7 +316,6 @@ def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, 
 
 
 def _checked(document: Document) -> Document:
-    from photostrip.formats.output.result_json import checked
 
     return checked(document, "the result")
 
@@ -329,13 +327,13 @@ def _require_form(form: str, known: Sequence[str]) -> None:
 
 
 def read_result(path: str | PathLike[str]) -> Result:
-    """Read a saved result: a result.json, or the folder that holds it.
+    """Read a saved result: a result.json, the folder that holds it, or a baseline.
 
     Raises InputError with every fault of the file.
     """
     from pathlib import Path
 
-    from photostrip.formats.output.result_json import read_result as read
+    from photostrip.formats.output.result_json import read_baseline
 
     file = Path(path)
-    return Result(read(str(file / RESULT if file.is_dir() else file)))
+    return Result(read_baseline(str(file / RESULT if file.is_dir() else file)))

@@ -73,7 +73,7 @@ def _block(
             wrong.append((path, f"holds the key {key!a}, which cannot be written", "a name"))
         elif isinstance(entry, Columns):
             found[key] = _table(below, entry, here, wrong)
-        elif isinstance(entry, dict):
+        elif isinstance(entry, Block):
             if isinstance(below, dict):
                 found[key] = _block(below, entry, here, wrong)
             elif below is None and entry.optional:

@@ -154,11 +154,11 @@ def _given(document: Document, role: str, *keys: str) -> Iterator[tuple[Any, ...
         if role not in document:
             return iter(())
         points = document[role]["points"]
-        columns = ([""] * len(points) if key == "rejected" else points.values(key) for key in keys)
+        columns = [[""] * len(points) if key == "rejected" else points.values(key) for key in keys]
     else:
         points = document["control"]
         points = points[points["role"] == role]
-        columns = map(points.values, keys)
+        columns = [points.values(key) for key in keys]
     return zip(*columns, strict=True)
 
 

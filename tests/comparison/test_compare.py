@@ -34,9 +34,11 @@ def documents(frame: str = "projected") -> tuple[Document, Document]:
     return by_rows(case(frame).document), by_rows(case(frame).document)
 
 
-def compare_results(now: Document, before: Document, *more: Tolerances, files: tuple[str, str] = ("", "")) -> Document:
+def compare_results(
+    now: Document, before: Document, tolerances: Tolerances | None = None, files: tuple[str, str] = ("", "")
+) -> Document:
     """Compare two results whose rows were changed."""
-    return comparison.compare_results(in_tables(now), in_tables(before), *more, files=files)
+    return comparison.compare_results(in_tables(now), in_tables(before), tolerances, files)
 
 
 def kind(found: Document, name: str) -> Document:

@@ -76,7 +76,7 @@ def test_without_control_it_is_a_free_network_in_the_frame_of_the_model(tmp_path
     assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
     found = photostrip.run(tmp_path / "block" / "project.yaml")
     assert [each["code"] for each in found.document["notes"] if each["code"] == "free-network"]
-    truth = photostrip.simulate(SPEC).truth["photos"]
+    truth = rows_of(photostrip.simulate(SPEC).truth["photos"])
     expected = TO_MODEL.apply(SCALE * np.array([[each[name] for name in "xyz"] for each in truth])) + SHIFT
     at = {each["id"]: [each[name] for name in "xyz"] for each in found.document["photos"]}
     assert np.abs([at[name_of(each["id"])] for each in truth] - expected).max() < 0.02  # of a flight of 3.7 units

@@ -18,12 +18,14 @@ import photostrip
 from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
 from photostrip.project.checks.check import check_project
+from photostrip.result.table import rows_of
 from tests.foreign import colmap_models
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
 from tests.foreign.metashape_models import LOCAL, SCALE, UTM, cameras, document, label_of, markers, simulated
 from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
 from tests.loops import nonempty
+from tests.results import rotation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,7 +45,7 @@ def on_earth(truth: Document) -> tuple[Floats, Floats]:
         longitude, latitude = to_wgs84.transform(places[:, 0], places[:, 1])
         return np.column_stack(to_earth.transform(longitude, latitude, places[:, 2]))
 
-    ground = np.array([[photo[axis] for axis in "xyz"] for photo in truth["photos"]])
+    ground = np.array([[photo[axis] for axis in "xyz"] for photo in rows_of(truth["photos"])])
     axes = []
     for step in 10.0 * np.eye(3):
         along = geocentric(ground + step) - geocentric(ground - step)
@@ -53,7 +55,7 @@ def on_earth(truth: Document) -> tuple[Floats, Floats]:
 
 def level(truth: Document) -> tuple[Floats, Floats]:
     """Give the same of a simulation in a local frame."""
-    ground = np.array([[photo[axis] for axis in "xyz"] for photo in truth["photos"]])
+    ground = np.array([[photo[axis] for axis in "xyz"] for photo in rows_of(truth["photos"])])
     return np.tile(np.eye(3), (len(ground), 1, 1)), ground
 
 
@@ -116,9 +118,9 @@ def test_orientations_are_those_of_the_chunk_on_the_earth(tmp_path: Path, chunk:
     assert (given.frame.crs, given.observed) == ("geocentric", False)
     truth = simulated(tmp_path / "again", control=CONTROL)
     axes, places = on_earth(truth)
-    order = [given.photos.index(label_of(each["id"])) for each in truth["photos"]]
+    order = [given.photos.index(label_of(each["id"])) for each in rows_of(truth["photos"])]
     np.testing.assert_allclose(given.enu[order], places, atol=1e-4)
-    expected = axes @ np.array([each["rotation"] for each in truth["photos"]]).reshape(-1, 3, 3)
+    expected = axes @ np.array([rotation(each) for each in rows_of(truth["photos"])])
     np.testing.assert_allclose(from_angles(given.angles, given.system)[order], expected, atol=1e-6)
     with (tmp_path / "block" / "orientations.csv").open(encoding="utf-8") as file:
         sigma = {float(row[name]) for row in csv.DictReader(file) for name in ("sx", "sy", "sz")}
@@ -135,7 +137,7 @@ def test_a_chunk_in_a_local_system_is_laid_on_its_control(tmp_path: Path, capsys
     with (tmp_path / "block" / "control.csv").open(encoding="utf-8") as file:
         assert {row[name] for row in csv.DictReader(file) for name in ("sx", "sy", "sz")} == {"0.02"}  # the settings
     found = run(tmp_path / "block" / "project.yaml")
-    for photo in nonempty(truth["photos"]):
+    for photo in nonempty(rows_of(truth["photos"])):
         center = [found["photos"][label_of(photo["id"])][axis] for axis in "xyz"]
         assert center == pytest.approx([photo[axis] for axis in "xyz"], abs=0.1)
 
@@ -203,7 +205,7 @@ def test_markers_beside_a_block_of_another_program(tmp_path: Path, capsys: pytes
     source, (lines, marks) = tmp_path / "markers.xml", markers(tmp_path / "native", truth)
     photos = [
         f'<camera id="{40 + number}" label="Фото {photo["id"]}" sensor_id="7"/>'
-        for number, photo in enumerate(truth["photos"])
+        for number, photo in enumerate(rows_of(truth["photos"]))
     ]
     source.write_text(document(photos, (lines, marks), UTM, np.zeros((1, 3))), encoding="utf-8")
     block = model.write_text(tmp_path / "model")

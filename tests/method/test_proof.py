@@ -43,6 +43,7 @@ from photostrip.strip.relative_orientation.orientation import RelativeSettings
 from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.attitudes import angle_between
 from tests.loops import nonempty
+from tests.results import rotation
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -371,7 +372,7 @@ def test_rotation_rows_are_east_north_up_at_the_perspective_centre() -> None:
     east = np.column_stack([-np.sin(lon), np.cos(lon), 0 * lon])
     up = np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
     expected = np.stack([east, np.cross(up, east), up], axis=1) @ found.simulation.truth.rotations
-    written = np.array([photo["rotation"] for photo in photos]).reshape(-1, 3, 3)
+    written = np.array([rotation(photo) for photo in photos])
     np.testing.assert_allclose(written, expected, rtol=0, atol=2e-9)
     assert np.degrees(np.arccos(up[0] @ up[-1])) > 0.25  # so that the place where the axes stand matters
 
@@ -386,14 +387,14 @@ def test_rotations_refer_to_the_grid_of_a_projection() -> None:
     assert convergence > 2.5
     azimuth = np.radians(70.0 - convergence)
     sin, cos = np.sin(azimuth), np.cos(azimuth)
-    np.testing.assert_allclose(middle["rotation"], [sin, -cos, 0, cos, sin, 0, 0, 0, 1], rtol=0, atol=2e-9)
+    np.testing.assert_allclose(rotation(middle).ravel(), [sin, -cos, 0, cos, sin, 0, 0, 0, 1], rtol=0, atol=2e-9)
 
 
 @pytest.mark.parametrize("crs", ["geocentric", "local"])
 def test_rotations_refer_to_the_axes_of_a_cartesian_frame(crs: str) -> None:
     axes = ("x", "y", "z") if crs == "geocentric" else ("east", "north", "up")
     found = recovered(exact(Spec(ground=Ground(crs=crs, axes=axes))))
-    written = np.array([photo["rotation"] for photo in document_of(found.result)["photos"]]).reshape(-1, 3, 3)
+    written = np.array([rotation(photo) for photo in document_of(found.result)["photos"]])
     np.testing.assert_allclose(written, found.simulation.truth.rotations, rtol=0, atol=2e-9)
 
 
@@ -595,8 +596,8 @@ def coordinates(result: Result) -> dict[str, Floats]:
     for strip in result.strips:
         centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
         rotations = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
-        for photo, center, rotation in zip(strip.strip.photos, centers, rotations, strict=True):
-            found[f"photo {photo}"] = np.vstack([center, rotation])
+        for photo, center, turn in zip(strip.strip.photos, centers, rotations, strict=True):
+            found[f"photo {photo}"] = np.vstack([center, turn])
     return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_files import rejected_csv
+from photostrip.formats.output.result_files import csv_pieces
 from photostrip.formats.output.simulation import project_files
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
@@ -54,7 +54,7 @@ def flown() -> Simulation:
 def rejected(inputs: Inputs, adjustment: str = "auto") -> str:
     """Give rejected.csv."""
     settings = replace(settings_of(flown()), adjustment=adjustment)
-    return "".join(rejected_csv(document_of(triangulate(inputs, settings))))
+    return "".join(csv_pieces(document_of(triangulate(inputs, settings))["rejected"]))
 
 
 def rows(text: str) -> list[dict[str, str]]:

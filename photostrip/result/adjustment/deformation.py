@@ -152,7 +152,7 @@ def _deformation(model: ModelDeformation, level: float) -> Document:
     limit = surface.critical(level)
     chance = min(surface.p_values) * LEVEL / level  # of all tests together
     omega, alpha = (angle * ARCSECONDS for angle in model.elements)
-    terms = {}
+    terms: Document = {}
     for k, name in enumerate(TERMS):
         terms |= {
             f"{name}_coefficient_m_per_mm2": surface.coefficients[3 + k],

@@ -91,7 +91,7 @@ def test_what_is_refused_says_why(result: dict[str, Any], capsys: pytest.Capture
     assert "statement-frame" in capsys.readouterr().out
     written(result | {"statement": {}})
     assert main(["statement", "result.json"]) == 2
-    assert "key 'statement." in capsys.readouterr().err
+    assert "statement.status: is missing" in capsys.readouterr().err
     with open("result.json", "w", encoding="utf-8") as file:  # noqa: PTH123 (the working folder)
         file.write(to_json(certified(result) | {"statement": result["statement"] | {"not_measured": 7}}))
     assert main(["statement", "result.json"]) == 2

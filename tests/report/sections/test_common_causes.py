@@ -133,7 +133,7 @@ def test_of_many_groups_the_most_significant_are_shown() -> None:
 def test_like_causes_share_a_line_and_name_what_explains_as_much() -> None:
     document = by_rows(adjusted(east=10.0, correction="offset"))
     of_photos = [{"cause": "shift of a photo", "of": f"{n}", "rivals": []} for n in range(9)]
-    of_list = {"cause": "control list", "of": "control[1]", "rivals": ["control list"]}
+    of_list: Document = {"cause": "control list", "of": "control[1]", "rivals": ["control list"]}
     of_list |= dict.fromkeys(f"{name}_{axis}" for name in ("shift", "sigma") for axis in ("east", "north"))
     of_list |= {"shift_up": 0.612, "sigma_up": 0.021}
     document["bundle"]["taken_up"] = [*of_photos, of_list]

@@ -28,7 +28,16 @@ def crowded() -> Document:
     note = {"severity": "note", "message": text, "strip": "", "photos": [], "points": []}
     note |= {"file": "", "line": 0, "column": 0, "key": ""}
     finding = {"title": "a mistake", "severity": "error", "accepted": False, "message": text, "fix": text}
-    finding |= {"evidence": {"size_m": 1.0}, "points": [], "photos": [], "strips": [], "file": "", "line": 0, "column": 0, "key": ""}
+    finding |= {
+        "evidence": {"size_m": 1.0},
+        "points": [],
+        "photos": [],
+        "strips": [],
+        "file": "",
+        "line": 0,
+        "column": 0,
+        "key": "",
+    }
     document |= {
         "status": "failed",
         "control": [{**row, "id": f"{n}"} for n in range(300) for row in (control, check)],

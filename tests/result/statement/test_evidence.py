@@ -14,6 +14,7 @@ from photostrip.result.statement.accuracy_statement import exit_code, statement_
 from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.statement.stating import stated
+from photostrip.result.table import Table
 from tests.results import Case, by_rows, case, in_tables
 
 GOOD = {"count": 30, "rmse": 0.106, "survey": 0.0424, "accuracy": 0.1141, "class_cm": 12, "mean": 0.09, "p90": 0.16}
@@ -23,7 +24,8 @@ def block(**parts: Any) -> dict[str, Any]:  # noqa: ANN401
     """Give a block of a result with 30 check points, with other values of some keys."""
     axis = {"rmse": 0.08, "mean": 0.001}
     found = {
-        "status": "", "not_measured": 0, "reasons": [], "sentences": [], "remarks": [],
+        "status": "", "not_measured": 0, "sentences": [], "remarks": [],
+        "reasons": Table.of_rows("statement.reasons", ()),
         "plan": GOOD, "height": {**GOOD, "rmse": 0.138, "survey": 0.05, "accuracy": 0.1471, "class_cm": 15},
         "axes": {"east": axis, "north": axis, "up": axis}, "space": {"accuracy": 0.1862, "class_cm": 19},
         "circle": {"ratio": 0.82, "ce90": 0.16, "ce95": 0.1825, "radial95": 0.1834},
@@ -150,7 +152,11 @@ def test_the_same_points_give_the_same_figures_in_every_frame(frame: str) -> Non
 def certified(document: dict[str, Any]) -> dict[str, Any]:
     """Give a document as it is read again, with the hash of its numbers."""
     found: dict[str, Any] = in_tables(by_rows(document))
-    return found | {"certificate": {"result_sha256": result_hash(found)}}
+    empty = {"set": [], "resolved_sha256": "", "inputs": [], "grids": [], "epochs": [], "versions": {}}
+    versions = dict.fromkeys(("photostrip", "python", "numpy", "scipy", "pyproj", "proj", "epsg"))
+    certificate = {"result_sha256": result_hash(found), **empty, "versions": versions}
+    whole: dict[str, Any] = in_tables(found | {"certificate": certificate})
+    return whole
 
 
 @pytest.mark.parametrize(("part", "key", "value"), [("plan", "accuracy", 0.01), ("height", "count", 31)])
