@@ -3,6 +3,6 @@
 FROM python:3.12-slim
 COPY pyproject.toml README.md LICENSE /source/
 COPY photostrip /source/photostrip
-RUN pip install --no-cache-dir "/source[report]"
+RUN pip install --no-cache-dir /source
 WORKDIR /work
 ENTRYPOINT ["photostrip"]

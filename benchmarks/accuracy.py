@@ -1,10 +1,10 @@
 """How accurate strips are: many simulated strips with known truth, all degrees of polynomial, against limits.
 
 Errors are those of all adjusted points that are not control, root mean square over all strips, in the directions
-along the strip (X), across it (Y) and up (Z). Beside the strip method stands a rigorous bundle adjustment of the same
-measurements, written apart from the program: it shows what the measurements hold.
+along the strip (X), across it (Y) and up (Z). Beside the polynomials stands the bundle adjustment of the same
+measurements, which tests hold beside Ceres: it shows what the measurements hold.
 
-Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length long layout] [--workers N] [--longest N]
+Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length long] [--workers N] [--longest N]
 """
 
 from __future__ import annotations
@@ -29,12 +29,10 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
-from photostrip.geodesy.tying import tie_frames  # noqa: E402
-from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.strip.polynomial import correction, terms  # noqa: E402
+from photostrip.strip import polynomial, polynomial_terms  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -47,7 +45,6 @@ if TYPE_CHECKING:
     from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SIGMA = 5e-6 * 10_000  # metres: 5 micrometres at the photo scale 1:10 000
 CONTROL_SIGMA = (0.02, 0.02, 0.02)  # metres, stated and real
@@ -56,7 +53,6 @@ FIXED = (SIMILARITY, "2", "3")
 CHOICES = (*FIXED, AUTO)
 TITLES = {SIMILARITY: "similarity", "2": "degree 2", "3": "degree 3", AUTO: "auto", BUNDLE: "bundle"}
 AUTO_LIMIT = 1.10  # auto against the best fixed choice
-BUNDLE_PASSES = 2  # it starts from the truth
 
 
 # ------------------------------------------------------------------------------------------- which strips
@@ -64,31 +60,16 @@ BUNDLE_PASSES = 2  # it starts from the truth
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the points of a photo lie: rows across the flight at each nadir, and further points anywhere in the models.
-
-    Parameters
-    ----------
-    title : str
-        Its name.
-    rows, more : int
-        Points at the nadir of each photo, and further points in each model.
-    reach, scatter : float
-        Place of the outermost rows in percent of half the width of the photo; scatter along the flight, percent.
-    lap : float or None
-        Overlap in percent; None: as the case has it.
-    """
+    """Points of a photo: rows across the flight at each nadir, and further points anywhere in the models."""
 
     title: str
     rows: int = 5
     more: int = 2
-    reach: float = 75.0
-    scatter: float = 25.0
-    lap: float | None = None
 
     @property
     def points(self) -> Points:
         """The same for the simulation."""
-        return Points(self.rows, self.reach, self.scatter, self.more)
+        return Points(self.rows, 75.0, 25.0, self.more)
 
 
 USUAL = Layout("5 rows and 2 more")
@@ -96,50 +77,20 @@ SPARSE = Layout("5 rows", more=0)
 
 
 def strip(models: int, bands: int, layout: Layout = USUAL, *, every: int | None = None) -> Spec:
-    """Specify a film strip of case (a): f = 153 mm, 1:10 000, 64 % overlap, bands of three control points.
-
-    Parameters
-    ----------
-    models : int
-        Models, one less than photos.
-    bands : int
-        Bands of control points, spread evenly.
-    layout : Layout
-        Places of the points.
-    every : int or None
-        Models from one band to the next, instead of `bands`.
-
-    Returns
-    -------
-    Spec
-        The specification.
-    """
+    """Specify a film strip of case (a): f = 153 mm, 1:10 000, 64 % overlap, bands of three control points."""
     return Spec(
-        camera=replace(FILM, principal_distance=153.0),
-        flight=Flight(photos=models + 1, end_lap_percent=layout.lap or 64.0),
+        camera=FILM,
+        flight=Flight(photos=models + 1, end_lap_percent=64.0),
         points=layout.points,
         control=Control(bands=bands, every=every, per_band=3, sigma=CONTROL_SIGMA),
     )
 
 
 def pairs_of_control(photos: int, layout: Layout = USUAL) -> Spec:
-    """Specify a film strip of case (b): f = 153.124 mm, 60 % overlap, two control points every five models.
-
-    Parameters
-    ----------
-    photos : int
-        Photos.
-    layout : Layout
-        Places of the points.
-
-    Returns
-    -------
-    Spec
-        The specification.
-    """
+    """Specify a film strip of case (b): f = 153.124 mm, 60 % overlap, two control points every five models."""
     return Spec(
         camera=replace(FILM, principal_distance=153.124),
-        flight=Flight(photos=photos, end_lap_percent=layout.lap or 60.0),
+        flight=Flight(photos=photos, end_lap_percent=60.0),
         points=layout.points,
         control=Control(every=5, per_band=2, sigma=CONTROL_SIGMA),
     )
@@ -171,19 +122,12 @@ def run(task: Task) -> Outcome:
     inputs, settings = inputs_of(simulation), settings_of(simulation)
     squares, degrees = {}, {}
     for choice in task.choices:
-        if choice == BUNDLE:
-            continue
-        simple = choice == SIMILARITY
-        wanted = replace(
-            settings,
-            adjustment="similarity" if simple else "polynomial",
-            polynomial=correction.PolynomialSettings(AUTO if simple else choice),
-        )
-        result = triangulate(inputs, wanted)
+        degree = choice if choice in {"2", "3"} else AUTO
+        by = choice if choice in {SIMILARITY, BUNDLE} else "polynomial"
+        chosen = replace(settings, adjustment=by, polynomial=polynomial.PolynomialSettings(degree), precision=False)
+        result = triangulate(inputs, chosen)
         squares[choice] = mean_squares(simulation, result, result.points.cartesian)
         degrees[choice] = _degrees(result)
-    if BUNDLE in task.choices:
-        squares[BUNDLE] = mean_squares(simulation, result, bundle(simulation)[result.points.number])
     pairs = result.strips[0].of_photos.orientation.pairs
     return Outcome(squares, degrees, len(pairs.pair) / pairs.size)
 
@@ -203,94 +147,8 @@ def _degrees(result: Result) -> tuple[int, int]:
     found = result.strips[0].polynomial
     if found is None:
         return 0, 0
-    plan, _, height = ([terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    plan, _, height = ([polynomial_terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
     return max(plan, default=0), max(height, default=0)
-
-
-# --------------------------------------------------------------------------------- the rigorous bundle beside
-
-
-def bundle(simulation: Simulation) -> Floats:
-    """Adjust all rays of a strip with its control in one least-squares solution, from the truth as start.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        One strip without distortion, film deformation and refraction.
-
-    Returns
-    -------
-    ndarray, shape (q, 3)
-        Adjusted points in the Cartesian frame, metres; meaningless where a point has one ray only.
-    """
-    truth, control = simulation.truth, simulation.control
-    origin = truth.points.xyz.mean(axis=0)
-    centers, rotations, points = truth.centers - origin, truth.rotations, truth.points.xyz - origin
-    frames, _ = tie_frames(simulation.frames)
-    rows = np.flatnonzero(~control.check)
-    at = {name: n for n, name in enumerate(truth.points.ids)}
-    fixed = np.array([at[control.ids[row]] for row in rows])
-    given = frames[0].cartesian_from_ground(control.enu[rows]) - origin
-    for _ in range(BUNDLE_PASSES):
-        moves, shifts = _bundle_step(simulation, (centers, rotations, points), fixed, given)
-        centers, points = centers + moves[:, :3], points + shifts
-        rotations = from_vector(moves[:, 3:]) @ rotations
-    result: Floats = points + origin
-    return result
-
-
-def _bundle_step(
-    simulation: Simulation, state: tuple[Floats, Floats, Floats], fixed: Numbers, given: Floats
-) -> tuple[Floats, Floats]:
-    """Solve one step: the normal equations reduced to the photos, then the points."""
-    misfit, by_photo, by_point = _linearised(simulation, state)
-    photo, point = simulation.observations.photo, simulation.observations.point
-    photos, points = len(state[0]), len(state[2])
-    weight = 1.0 / simulation.control.sigma[0, 0] ** 2
-    of_points, right_points = _sums(by_point, misfit, point, points)
-    of_points[fixed] += weight * np.eye(3)
-    right_points[fixed] += weight * (given - state[2][fixed])
-    of_points += 1e-9 * np.eye(3)  # keeps points with one ray from stopping the rest
-    of_photos, right_photos = _sums(by_photo, misfit, photo, photos)
-    mixed = np.zeros((photos, 6, points, 3))
-    mixed[photo, :, point] = np.einsum("mai,maj->mij", by_photo, by_point)  # a point is measured once on a photo
-
-    n, inverse = 6 * photos, np.linalg.inv(of_points)
-    carried = np.einsum("nips,pst->nipt", mixed, inverse).reshape(n, -1)
-    flat = mixed.reshape(n, -1)
-    reduced = -carried @ flat.T
-    diagonal = np.arange(n).reshape(-1, 6)
-    reduced[diagonal[:, :, None], diagonal[:, None, :]] += of_photos
-    scale = 1.0 / np.sqrt(np.diag(reduced))  # metres and radians side by side
-    right = (right_photos.ravel() - carried @ right_points.ravel()) * scale
-    moves = np.linalg.solve(reduced * scale * scale[:, None], right) * scale
-    shifts = np.einsum("pst,pt->ps", inverse, right_points - (moves @ flat).reshape(-1, 3))
-    return moves.reshape(-1, 6), shifts
-
-
-def _linearised(simulation: Simulation, state: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
-    """Give misfits of image coordinates and their derivatives by photos and points, all in units of sigma."""
-    seen, (centers, rotations, points) = simulation.observations, state
-    focal, turn = simulation.camera.principal_distance, rotations[seen.photo]
-    arm = points[seen.point] - centers[seen.photo]
-    ray = np.einsum("mi,mij->mj", arm, turn)
-    xy = -focal * ray[:, :2] / ray[:, 2:]
-    by_ray = np.zeros((len(seen), 2, 3))
-    by_ray[:, 0, 0] = by_ray[:, 1, 1] = -focal / ray[:, 2]
-    by_ray[:, :, 2] = -xy / ray[:, 2:]
-    by_point = np.einsum("mij,mkj->mik", by_ray / seen.sigma[:, :, None], turn)
-    # A camera turned by theta sees the arm turned by -theta.
-    by_photo = np.concatenate([-by_point, -np.cross(arm[:, None, :], by_point)], axis=2)
-    return (seen.xy - xy) / seen.sigma, by_photo, by_point
-
-
-def _sums(derivatives: Floats, misfit: Floats, group: Numbers, groups: int) -> tuple[Floats, Floats]:
-    """Sum normal matrices and right sides of photos, or of points."""
-    size = derivatives.shape[2]
-    normal, right = np.zeros((groups, size, size)), np.zeros((groups, size))
-    np.add.at(normal, group, np.einsum("mai,maj->mij", derivatives, derivatives))
-    np.add.at(right, group, np.einsum("mai,ma->mi", derivatives, misfit))
-    return normal, right
 
 
 # ------------------------------------------------------------------------------------------ many strips
@@ -484,50 +342,11 @@ def case_long(pool: Pool, seeds: int, longest: int = LONG[-1]) -> None:
     table(("strip", *heads, *(f"{TITLES[choice]}/b." for choice in CHOICES)), rows)
 
 
-LAYOUTS = (
-    USUAL,
-    Layout("reach 65 %", reach=65.0),
-    Layout("reach 70 %", reach=70.0),
-    Layout("reach 80 %", reach=80.0),
-    Layout("reach 85 %", reach=85.0),
-    Layout("no scatter", scatter=0.0),
-    Layout("scatter 50 %", scatter=50.0),
-    Layout("overlap 62 %", lap=62.0),
-    Layout("overlap 67 %", lap=67.0),
-    Layout("3 rows and 3 more", rows=3, more=3),
-    Layout("3 rows and 4 more", rows=3, more=4),
-    Layout("3 rows and 6 more", rows=3, more=6),
-    Layout("4 rows and 2 more", rows=4, more=2),
-    SPARSE,
-    Layout("5 rows and 4 more", more=4),
-)
-
-
-def case_layout(pool: Pool, seeds: int) -> None:
-    """Print how the numbers of (a) and (b) depend on where the points lie."""
-    print(
-        "(layout) measured values divided by their limits, (a) along/across/up and (b) plan/height, for other places of"
-    )
-    print(f"    the points; {seeds} strips of each kind; per model: points common to two photos in (a)\n")
-    rows = []
-    for layout in LAYOUTS:
-        cells, per_model = [], 0.0
-        for models, bands, choice, limits in CASES_A:
-            of = measure(pool, strip(models, bands, layout), seeds, (choice,))[choice]
-            cells.append(slashed(of.rms / SIGMA / np.array(limits)))
-            per_model = of.per_model
-        of = measure(pool, pairs_of_control(20, layout), seeds, ("3",))["3"]
-        rows.append((layout.title, f"{per_model:.1f}", *cells, slashed(of.plan_height / np.array(LIMITS_B["3"]))))
-    heads = [f"{models}/{bands} {TITLES[choice]}" for models, bands, choice, _ in CASES_A]
-    table(("points", "per model", *heads, "(b) degree 3"), rows)
-
-
 CASES: dict[str, Callable[[Pool, int], None]] = {
     "a": case_a,
     "b": case_b,
     "length": case_length,
     "long": case_long,
-    "layout": case_layout,
 }
 
 

@@ -26,16 +26,16 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from benchmarks import peers  # noqa: E402
+from photostrip.network.adjustment import solve  # noqa: E402
 from photostrip.network.cofactors import cofactors_of  # noqa: E402
-from photostrip.network.solve import solve  # noqa: E402
 from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 from tests.simulated_bundle import problem_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from photostrip.network.adjustment import BundleSolution, Cofactors
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution, Cofactors
 
 LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}
 LARGEST_MEMORY = 350.0  # MB, at 1000 photos with 300 points each
@@ -219,7 +219,7 @@ def _peak(given: BundleProblem) -> tuple[float, float]:
     """Peak memory of a process that adjusts a problem, MB: all of it, and what it had before, the arrays included."""
     import resource
 
-    import scipy.linalg.lapack  # noqa: F401  what the adjustment needs
+    import scipy.linalg.lapack  # noqa: F401
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
     cofactors_of(solve(given))

@@ -44,7 +44,7 @@ def edited_results(number: int, seed: int) -> int:
         right = Path(place) / "right.json"
         right.write_bytes(RESULT.read_bytes())
         for each in range(number):
-            random = Random(f"{seed} {each}")  # noqa: S311 (no secret)
+            random = Random(f"{seed} {each}")  # noqa: S311 (the same cases every time)
             wrong += faults_of(edited(saved(), random), right, Path(place), random.choice(COMMANDS))
     print(f"{number} edited results, seed {seed}, {time.perf_counter() - begin:.0f} s")
     print(f"wrong: {len(wrong)}", *wrong[:SHOWN], sep="\n  ")
@@ -74,7 +74,7 @@ def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
     with tempfile.TemporaryDirectory() as place:
         right = (blocks if of_blocks else projects)(Path(place) / "right")
         for each in range(number):
-            random = Random(f"{seed} {each}")  # noqa: S311 (no secret: the same cases every time)
+            random = Random(f"{seed} {each}")  # noqa: S311 (the same cases every time)
             case, command = damaged(right, random), random.choice(["run", "check"])
             outcome = tried(case, emptied(Path(place) / "case"), command)
             codes[command, outcome.code] += 1

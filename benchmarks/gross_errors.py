@@ -43,7 +43,7 @@ from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
-from photostrip.strip.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE  # noqa: E402
+from photostrip.strip.gross_errors.control_screening import EITHER, WRONG_IMAGE  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -63,10 +63,7 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of a measurement; micrometres
 WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
-SPOT, SLOPE = (1.0, 20.0), 0.3  # m and its sine: another spot than the control point that was meant
 MUCH_SHARE, MUCH_ERRORS, MUCH_POINTS = 0.4, (5.0, 100.0), (14, 20)  # of much wrong control; m; control points
-PHOTO_SHARE, PHOTO_ERRORS = 0.2, (0.5, 50.0)  # of the image points of one photo; mm
-EXTRA_POINTS, ORIENTED = (2, 8, 20), 1.2  # for each model; largest ratio of the errors of an oriented strip
 RUNS = ("without errors", "errors, auto", "errors, none", "errors, known")
 CLEAN, AUTO, NONE, KNOWN = RUNS
 SIZES = {6: 2, 20: 2, 60: 4, 200: 8, 1000: 20, 3000: 30}  # photos of clean projects, and strips of the blocks
@@ -82,11 +79,6 @@ SCATTERED = replace(
     STRIP,
     flight=replace(STRIP.flight, photos=13),
     control=Control(layout="random", use={"xy": 0.2, "z": 0.2, "xyz": 0.6}, sigma=(0.02, 0.02, 0.02)),
-)
-LONG_STRIP = Spec(
-    flight=Flight(photos=1000),
-    control=Control(layout="bands", every=15, per_band=3),
-    gross_errors=(GrossError("image", count=300, size_um=300), GrossError("control", count=2, size_m=5)),
 )
 KINDS = {
     "strips": STRIP,
@@ -487,86 +479,9 @@ def print_much_wrong(pool: Pool, seeds: range) -> None:
     print(f"{failed.sum()} failed\n", flush=True)
 
 
-def another_spot_run(seed: int) -> tuple[int, int, int]:
-    """Adjust a strip with one control point identified wrongly: whether its plan and height are named, and others."""
-    rng, project = np.random.default_rng(seed), project_of(simulate(replace(STRIP, seed=seed)))
-    control = project.inputs.control
-    row = int(rng.choice(np.flatnonzero(control.use.all(axis=1) & ~control.check)))
-    way = rng.normal(size=2)
-    way *= np.exp(rng.uniform(*np.log(SPOT))) / np.linalg.norm(way)
-    enu = control.enu.copy()
-    enu[row] += [*way, rng.uniform(-SLOPE, SLOPE) * np.linalg.norm(way)]
-    result = triangulate(replace(project.inputs, control=replace(control, enu=enu)), project.settings)
-    (kept,) = (strip.control for strip in result.strips)
-    out = np.array([control.use[control.ids.index(name)] for name in kept.ids]) & ~kept.use
-    plan, height = out[kept.ids.index(control.ids[row])][[0, 2]].tolist()
-    return plan, height, int(out.any(axis=1).sum()) - int(plan or height)
-
-
-def print_another_spot(pool: Pool, seeds: range) -> None:
-    """Print how often plan and height of a control point are named that is identified wrongly."""
-    plan, height, others = np.array(pool.map(another_spot_run, seeds, 1), int).T
-    print(
-        f"one control point identified 1 to 20 m beside: plan named in {plan.sum()} of {len(seeds)} strips, its height"
-    )
-    print(f"too in {(plan & height).sum()}, {others.sum()} other points\n", flush=True)
-
-
-def wrong_photo_run(extra: int, seed: int) -> tuple[int, float]:
-    """Adjust a strip with a fifth of one photo wrong: image points there, errors of the others over those without."""
-    plain = project_of(simulate(replace(STRIP, points=replace(STRIP.points, extra_per_model=extra), seed=seed)))
-    rng, o = np.random.default_rng(seed), plain.inputs.observations
-    rows = np.flatnonzero(o.photo == rng.integers(len(o.photo_ids)))
-    wrong = rng.choice(rows, round(PHOTO_SHARE * len(rows)), replace=False)
-    way = rng.normal(size=(len(wrong), 2))
-    smallest, largest = np.log(PHOTO_ERRORS).tolist()
-    size = np.exp(rng.uniform(smallest, largest, len(wrong))) / np.hypot(*way.T)
-    xy = o.xy.copy()
-    xy[wrong] += way * size[:, None]
-    spoiled = replace(plain, inputs=replace(plain.inputs, observations=replace(o, xy=xy)))
-    names = [plain.names[row] for row in wrong.tolist()]
-    try:
-        clean, auto = (np.square(adjusted(each, each.settings).sound(names)).mean() for each in (plain, spoiled))
-    except PhotostripError as error:
-        print(f"wrong photo {seed}: {error}")
-        return len(rows), float("inf")
-    return len(rows), float(np.sqrt(auto / clean))
-
-
-def print_wrong_photo(pool: Pool, seeds: range) -> None:
-    """Print how many strips are oriented although a fifth of the image points of one photo is wrong."""
-    found = np.array(pool.starmap(wrong_photo_run, product(EXTRA_POINTS, seeds), 1)).reshape(len(EXTRA_POINTS), -1, 2)
-    print(f"{PHOTO_SHARE:.0%} of one photo wrong   strips   oriented   ratio: median, 95 % below, largest")
-    for count, ratio in found.transpose(0, 2, 1):
-        cells = f"{np.mean(count):10.0f} points a photo{len(ratio):8d}{(ratio < ORIENTED).sum():11d}"
-        print(cells, "{:14.3f}{:12.3f}{:9.3f}".format(*np.quantile(ratio, (0.5, 0.95, 1.0))))
-    print(flush=True)
-
-
-def long_run(seed: int) -> tuple[int, int, int]:
-    """Adjust a strip of 1000 photos with many errors: wrong control, how much of it is named, sound control named."""
-    project = project_of(simulate(replace(LONG_STRIP, seed=seed)))
-    run = adjusted(project, project.settings)
-    wrong = project.wrong_control & run.control
-    return len(wrong), len(wrong & run.rejected), len(run.rejected - wrong)
-
-
-def print_long(pool: Pool, seeds: range) -> None:
-    """Print whether much that is wrong in a long strip costs sound control."""
-    some = seeds[: max(2, len(seeds) // 5)]
-    wrong, named, others = np.array(pool.map(long_run, some, 1)).T
-    print(
-        f"{len(some)} strips of 1000 photos with 300 image errors: {named.sum()} of {wrong.sum()} wrong control points"
-    )
-    print(f"named, {others.sum()} sound ones in {(others > 0).sum()} strips\n", flush=True)
-
-
 OTHERS = {
     "clean": print_clean,
     "wrong-control": print_much_wrong,
-    "another-spot": print_another_spot,
-    "wrong-photo": print_wrong_photo,
-    "long": print_long,
 }
 
 

@@ -28,11 +28,11 @@ import numpy as np  # noqa: E402
 from photostrip.camera import Camera  # noqa: E402
 from photostrip.pipeline.inputs import Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
-from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
+from photostrip.pipeline.strips.method import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
-from photostrip.strip.polynomial import correction  # noqa: E402
+from photostrip.strip import polynomial  # noqa: E402
 from photostrip.strip.relative_orientation.orientation import RelativeSettings  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
@@ -112,7 +112,7 @@ def settings(method: str, *, screening: str = "none", precision: bool = True) ->
     return Settings(
         adjustment="similarity" if method == "similarity" else "polynomial",
         relative=RelativeSettings(screening=screening),
-        polynomial=correction.PolynomialSettings(degree),
+        polynomial=polynomial.PolynomialSettings(degree),
         precision=precision,
     )
 

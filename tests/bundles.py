@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.network.adjustment import BundleSolution
     from photostrip.network.problem import BundleProblem, PositionObservations
-    from photostrip.network.solution import BundleSolution
 
     Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.precision.photo_precision import fitted
+from photostrip.pipeline.precision import fitted
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import Result
-    from photostrip.strip.error_propagation.fitted_strip import FittedStrip
-    from photostrip.strip.error_propagation.strip_errors import StripErrors
+    from photostrip.strip.fitted_strip import FittedStrip
+    from photostrip.strip.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
 

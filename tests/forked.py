@@ -40,8 +40,6 @@ if TYPE_CHECKING:
 # What commands import when they need it, beside the modules of the program.
 LIBRARIES = (
     "jinja2",
-    "matplotlib.backends.backend_svg",
-    "matplotlib.figure",
     "pyproj.network",
     "pyproj.transformer",
     "rich.live",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip.plausibility import KINDS
-from photostrip.plausibility.causes import CAUSES
+from photostrip.plausibility.finding import CAUSES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import photostrip
-from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.main import COMMANDS, PROGRAM
 from photostrip.cli.main import main as command_line
-from photostrip.cli.whole_program import whole_program
 from photostrip.result.schema import result_page
 
 if TYPE_CHECKING:
@@ -178,7 +177,7 @@ def _escaped(text: str) -> str:
 
 def every_command() -> Iterator[tuple[str, Any]]:
     """Return every command with its name, each followed by those below it."""
-    root: Any = typer.main.get_command(whole_program())
+    root: Any = typer.main.get_command(PROGRAM)
     waiting = [(name, root.commands[name]) for name in COMMANDS]
     while waiting:
         name, command = waiting.pop(0)
@@ -211,7 +210,7 @@ def command_page() -> str:
         lines += ["| argument, option | |", "|---|---|"]
         lines += [f"| {_escaped(f'`{term}`')} | {_escaped(text)} |" for term, text in rows]
         if name in COMMANDS:
-            lines += ["", "```text", *textwrap.dedent(COMMANDS[name].example).splitlines(), "```"]
+            lines += ["", "```text", *textwrap.dedent(COMMANDS[name][1]).splitlines(), "```"]
         lines.append("")
     for title, entries in (("Exit codes", EXIT_CODES), ("Environment", VARIABLES)):
         lines += [f"## {title}", "", "| | |", "|---|---|"]

@@ -8,13 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.problem import (
-    BundleCameras,
-    BundleProblem,
-    ControlObservations,
-    ImageObservations,
-    StartValues,
-)
+from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,8 +12,6 @@ from benchmarks import planted
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
-PYTHON = sys.executable  # loads what it runs
-
 
 @pytest.fixture(autouse=True)
 def _copies(request: pytest.FixtureRequest) -> None:
@@ -28,12 +26,6 @@ def printed(program: str, *options: str, python: str = "") -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT.parent).stdout
 
 
-def test_every_stage_that_the_strip_benchmark_times_exists() -> None:
-    from benchmarks.strip import STAGES  # limits the threads of the process
-
-    assert [f"{module.__name__}.{name}" for _, module, name in STAGES if not hasattr(module, name)] == []
-
-
 @pytest.mark.slow
 def test_accuracy_prints_limits_and_what_was_measured() -> None:
     out = printed("accuracy.py", "--seeds", "1", "--cases", "b", "long", "--workers", "1", "--longest", "10")
@@ -45,14 +37,10 @@ def test_accuracy_prints_limits_and_what_was_measured() -> None:
 
 
 @pytest.mark.slow
-def test_strip_prints_seconds_memory_parts_and_growth() -> None:
-    out = printed("strip.py", "--rows", "short", "--photos", "8", "--sizes", "4", "8", "--repeat", "1")
+def test_strip_prints_seconds_memory_and_growth() -> None:
+    out = printed("strip.py", "--rows", "short", "--sizes", "4", "8", "--repeat", "1")
     assert re.search(r"^20 photos +\d+\.\d\d +\d+\.\d +5 +\d+", out, re.MULTILINE)
-    assert re.search(r"\d+ pairs of 24 points in one batch +\d+ us", out)
-    assert re.search(r"^exponent of triangulate from 4 to 8 photos +-?\d", out, re.MULTILINE)
-    shares = [float(value) for value in re.findall(r"^\w[\w ,.]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
-    assert shares[-1] == 100.0
-    assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.5)
+    assert re.search(r"^exponent from 4 to 8 photos -?\d", out, re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -29,6 +29,7 @@ LAYERS = (
     {"project"},
     {"foreign"},
     {"report"},
+    {"sheets"},
     {"library"},
     {"batch"},
     {"cli"},
@@ -97,57 +98,3 @@ def _circles(edges: Iterable[tuple[str, str]]) -> list[str]:
 def test_the_package_keeps_its_layers() -> None:
     assert len(modules()) > len(LAYERS)
     assert violations(ROOT) == []
-
-
-@pytest.mark.parametrize(
-    ("files", "expected"),
-    [
-        ({"camera.py": "from photostrip.pipeline import triangulate"}, ["upward: photostrip.camera:1"]),
-        ({"camera.py": "def f():\n    import photostrip.pipeline"}, ["upward: photostrip.camera:2"]),
-        (
-            {"camera.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from photostrip import pipeline"},
-            ["upward: photostrip.camera:3"],
-        ),
-        ({"geometry/plane.py": "from ..pipeline import triangulate"}, ["upward: photostrip.geometry.plane:1"]),
-        ({"camera.py": "import importlib\nimportlib.import_module('photostrip.cli')"}, ["upward: photostrip.camera:2"]),
-        (
-            {"formats/text/tables.py": "import photostrip.project.yaml.schema"},
-            ["upward: photostrip.formats.text.tables:1"],
-        ),
-        ({"report/page/text.py": "from photostrip.project import schema"}, ["apart: photostrip.report.page.text:1"]),
-        ({"project/yaml/schema.py": "from photostrip.formats import tables"}, []),
-        ({"utils.py": ""}, ["photostrip/utils belongs to no layer"]),
-        (
-            {"geometry/plane.py": "import photostrip.geometry.rotation", "geometry/rotation.py": "from . import plane"},
-            ["circle: photostrip.geometry."],
-        ),
-        (
-            {"points.py": "import photostrip.camera", "camera.py": "from photostrip.points import PointTable"},
-            ["circle: photostrip.", "circle: "],
-        ),
-        (
-            {"geometry/plane.py": "import photostrip.points", "points.py": "import photostrip.geometry.rotation"},
-            ["circle: "],
-        ),
-        (
-            {
-                "formats/text/tables.py": "import photostrip.formats.output.plans",
-                "formats/output/plans.py": "import photostrip.formats.text.numbers",
-            },
-            ["circle: photostrip.formats.output <- photostrip.formats.text <- photostrip.formats.output"],
-        ),
-    ],
-)
-def test_a_bad_house_is_found(tmp_path: Path, files: dict[str, str], expected: list[str]) -> None:
-    rooms = ("geometry", "formats", "report", "project", "cli")
-    plan = dict.fromkeys(["__init__.py", "camera.py", "points.py", "pipeline.py", "geometry/rotation.py"], "")
-    plan |= {f"{folder}/__init__.py": "" for folder in rooms}
-    plan |= {"geometry/plane.py": "", "project/yaml/schema.py": "", "formats/text/tables.py": ""}
-    plan |= {"formats/text/numbers.py": "", "formats/output/plans.py": ""}
-    for name, text in (plan | files).items():
-        path = tmp_path / PACKAGE / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    found = violations(tmp_path)
-    assert len(found) == len(expected), found
-    assert [text[: len(start)] for text, start in zip(found, expected, strict=True)] == expected

@@ -63,21 +63,6 @@ def source_archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build("sdist", tmp_path_factory.mktemp("sdist"))
 
 
-def test_the_source_archive_holds_what_builds_the_wheel(source_archive: Path) -> None:
-    with tarfile.open(source_archive) as archive:
-        names = {name.partition("/")[2] for name in archive.getnames()}
-    assert {"pyproject.toml", "README.md", "LICENSE", "photostrip/__init__.py"} <= names
-    assert {name.partition("/")[0] for name in names} <= {
-        "photostrip",
-        "pyproject.toml",
-        "README.md",
-        "CHANGELOG.md",
-        "LICENSE",
-        "PKG-INFO",
-        ".gitignore",  # hatchling always adds it
-    }
-
-
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory, source_archive: Path) -> Path:
     """Build the wheel from the source archive, away from the clone."""
@@ -148,14 +133,6 @@ def test_the_recipe_asks_for_the_same_libraries() -> None:
     assert listed == needs()
     assert recipe["package"]["version"] == photostrip.__version__
     assert recipe["build"]["entry_points"] == ["photostrip = photostrip.cli.main:main"]
-
-
-def test_the_image_is_made_of_what_builds_the_package() -> None:
-    lines = (ROOT / "Dockerfile").read_text(encoding="utf-8").splitlines()
-    copied = [name for line in lines if line.startswith("COPY") for name in line.split()[1:-1]]
-    assert nonempty(copied) == ["pyproject.toml", "README.md", "LICENSE", "photostrip"]
-    assert [name for name in copied if not (ROOT / name).exists()] == []
-    assert 'RUN pip install --no-cache-dir "/source[report]"' in lines  # the libraries are those of pyproject.toml
 
 
 def test_the_citation_is_of_this_version() -> None:

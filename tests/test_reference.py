@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import photostrip
-from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.main import COMMANDS
 from tests.loops import nonempty
 from tests.reference import command_page, every_command, plain_fences, python_page
 
@@ -27,7 +27,7 @@ def test_every_command_is_there_with_its_options() -> None:
     page = command_page()
     named = re.findall(r"^## `photostrip (.+)`$", page, re.MULTILINE)
     assert [each for each in named if " " not in each] == list(COMMANDS)
-    assert {"plan model", "step chain", "terrestrial directions"} <= set(named)
+    assert "step chain" in named
     for name, command in nonempty(list(every_command())):
         part = page.partition(f"## `photostrip {name}`")[2].partition("\n## ")[0]
         assert [option for each in command.params for option in each.opts[:1] if option.startswith("--")

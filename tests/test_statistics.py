@@ -19,7 +19,7 @@ from photostrip.statistics import (
     tau_limit,
 )
 from tests.loops import nonempty
-from tests.vectors import cases, section, vector
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -126,16 +126,6 @@ def test_samples_of_the_formula_book(example: Vector) -> None:
             break
         rejected.append(left.pop(index))
     assert rejected == expected["rejected_indices_iterative"]
-
-
-def test_all_examples_are_here() -> None:
-    assert [example.id for example in section("grubbs")][:4] == [
-        "grubbs-critical",
-        "tau-critical",
-        "grubbs-sample-1",
-        "grubbs-sample-2",
-    ]
-    assert vector("grubbs-sample-2").input["sample"]
 
 
 def test_the_noncentrality_of_one_error_is_that_of_geodesy() -> None:

@@ -1,9 +1,8 @@
-"""What a user types: a file for each command in ``commands``, and ``main``, which finds and calls them.
+"""What a user types: a file for each command in ``commands``, and ``main``, which makes one program of them.
 
-- ``command_table``: all commands, and ``photostrip --help``; ``options``: options that several commands share;
+- ``options``, ``section_option``, ``option_groups``: options that several commands share;
 - ``stdout``: what is printed, in which form; ``stderr``: what is said meanwhile;
 - ``failures``: which exit code a failure has, and how it is reported;
-- ``option_groups``, ``section_option``, ``typed_values``, ``documents``, ``whole_program``: what options and answers of
-  several commands have in common;
-- ``jobs``: what is too long for the file of its command: a batch, the baseline, manual pages.
+- ``documents``, ``sheets``: how plans and terrestrial computations are shown;
+- ``jobs``: what is too long for the file of its command: a batch, a conversion, the sources.
 """

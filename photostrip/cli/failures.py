@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 
 import typer
 
@@ -21,8 +22,15 @@ EXIT_INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
 EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE
 
 
+DEBUG: ContextVar[bool] = ContextVar("DEBUG", default=False)  # whether tracebacks are wanted
+
+
 def exit_code_of(error: BaseException, *, debug: bool) -> int:
     """Say on stderr what went wrong, and return the exit code for it."""
+    hidden = error  # an interrupt that another error hides: what was being imported then is there in part
+    while hidden.__context__ is not None and not isinstance(error, KeyboardInterrupt):
+        hidden = hidden.__context__
+        error = hidden if isinstance(hidden, KeyboardInterrupt) else error
     if isinstance(error, BrokenPipeError):
         # what is still in the buffer has no reader; without this the interpreter complains when it ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -42,7 +50,7 @@ def exit_code_of(error: BaseException, *, debug: bool) -> int:
             place = f"{error.filename}: " if error.filename else ""
             messages, code = [f"{place}{error.strerror or error}"], EXIT_INPUT
         case _:
-            hint = "" if debug else "; --debug shows where"
+            hint = "" if debug else "; photostrip --debug COMMAND shows where"
             sys.stderr.write(f"internal error (a bug): {type(error).__name__}: {visible(str(error))}{hint}\n")
             return EXIT_INTERNAL
     lines = [f"error: {visible(message)}" for message in messages]

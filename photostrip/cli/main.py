@@ -1,7 +1,7 @@
-"""The command line: find the command, run it, give its exit code; ``failures`` has the codes of what goes wrong.
+"""The command line: all commands as one program of typer, its exit code, and what it prints on.
 
-``photostrip --version`` and ``--help`` answer from the table of commands alone; a command, and the libraries below it,
-are imported when it is called.
+A command returns its exit code, or None for 0; what it raises becomes a message and a code in ``failures``. The
+libraries below a command are imported when it is called.
 """
 
 from __future__ import annotations
@@ -9,63 +9,141 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import re
 import sys
-from collections.abc import Callable, Sequence
-from functools import cache
-from importlib import import_module
-from typing import TYPE_CHECKING, TextIO, cast
+from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
+from typing import Annotated, TextIO
+
+import typer
 
 from photostrip import __version__
-from photostrip.cli.command_table import COMMANDS, COMPLETION, HELP_NAMES, usage
-from photostrip.visible import visible
+from photostrip.cli.commands.batch import batch
+from photostrip.cli.commands.check import check
+from photostrip.cli.commands.compare import compare
+from photostrip.cli.commands.convert import convert
+from photostrip.cli.commands.info import info, sources
+from photostrip.cli.commands.init import init
+from photostrip.cli.commands.plan import plan
+from photostrip.cli.commands.report import report
+from photostrip.cli.commands.run import run
+from photostrip.cli.commands.schema import schema
+from photostrip.cli.commands.simulate import simulate
+from photostrip.cli.commands.statement import statement
+from photostrip.cli.commands.step import step
+from photostrip.cli.commands.terrestrial import terrestrial
+from photostrip.cli.failures import DEBUG, exit_code_of
+from photostrip.cli.option_groups import HELP_NAMES
+from photostrip.errors import EXIT_INPUT
 
-if TYPE_CHECKING:
-    from typer._click.core import Command
-
-EXIT_USAGE = 2
+Command = Callable[..., int | None]
 NEW_OBJECTS = 1_000_000  # between two looks of the garbage collector
+COMMANDS: dict[str, tuple[Command | typer.Typer, str]] = {
+    "init": (init, "photostrip init strip-a"),
+    "convert": (convert, "photostrip convert sparse/0 -o block --sigma 0.7"),
+    "check": (check, "photostrip check project.yaml"),
+    "run": (run, "photostrip run project.yaml -o result"),
+    "batch": (batch, "photostrip batch strips/* -o results -j 4"),
+    "report": (report, "photostrip report result/result.json"),
+    "statement": (statement, "photostrip statement result --class-plan 15 --class-height 20"),
+    "compare": (compare, "photostrip compare result baseline.json --tol exact.yaml"),
+    "simulate": (simulate, "photostrip simulate strip.yaml -o simulated"),
+    "plan": (plan, "photostrip plan model --set end_lap_percent=60 --set control.layout=corners"),
+    "step": (step, "photostrip step relative pair.csv -f 153 --base 920 --unit m"),
+    "terrestrial": (terrestrial, "photostrip terrestrial displacement survey.yaml -o survey.svg"),
+    "sources": (sources, "photostrip sources --format md"),
+    "schema": (schema, "photostrip schema -o photostrip.schema.json"),
+    "info": (info, "photostrip info --format json"),
+}  # with an example of each
+ENVIRONMENT = """\
+PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET, PHOTOSTRIP_VERBOSE and PHOTOSTRIP_DEBUG stand in for the options
+of these names; NO_COLOR forbids colours.
+
+Exit codes: 0 done; 1 done, but a tolerance or a comparison failed; 2 wrong usage, project file or data; 3 the geometry
+is too weak; 70 an internal error (a bug).
+"""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def _version(asked: bool) -> None:
+    if asked:
+        sys.stdout.write(f"photostrip {__version__}\n")
+        raise typer.Exit
+
+
+def photostrip(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", envvar="PHOTOSTRIP_DEBUG", help="Print the traceback of an error.")
+    ] = False,
+) -> None:
+    """Analytical strip phototriangulation: from measured image coordinates to adjusted ground coordinates."""
+    DEBUG.set(debug)
+
+
+def program(commands: Iterable[tuple[str, Command | typer.Typer, str]]) -> typer.Typer:
+    """Return a program of commands, each with an example."""
+    whole = typer.Typer(
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        no_args_is_help=True,
+        context_settings=HELP_NAMES,
+        epilog=ENVIRONMENT,
+    )
+    whole.callback()(photostrip)
+    for name, command, example in commands:
+        epilog = f"\b\nExample:\n  {example}"  # \b: typer keeps the line breaks
+        if isinstance(command, typer.Typer):
+            _end_all(command)
+            whole.add_typer(command, name=name, epilog=epilog)
+        else:
+            whole.command(name, context_settings=HELP_NAMES, epilog=epilog)(_ended(command))
+    return whole
+
+
+def _end_all(group: typer.Typer) -> None:
+    for each in group.registered_commands:
+        each.callback = each.callback and _ended(each.callback)
+    for below in group.registered_groups:
+        _end_all(below.typer_instance or typer.Typer())
+
+
+def _ended(command: Command) -> Callable[..., None]:
+    """Let what a command returns or raises become an exit code."""
+
+    @wraps(command)
+    def ended(*values: object, **options: object) -> None:
+        try:
+            code = command(*values, **options)
+            sys.stdout.flush()  # a closed pipe shows here, not at the end of the interpreter
+        except (typer.Exit, typer.BadParameter):
+            raise
+        except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (the one place where failures become exit codes)
+            code = exit_code_of(error, debug=DEBUG.get())
+        raise typer.Exit(code or 0)
+
+    return ended
+
+
+PROGRAM = program((name, command, example) for name, (command, example) in COMMANDS.items())
+
+
+def main(arguments: Sequence[str] | None = None, whole: typer.Typer = PROGRAM) -> int:
     """Run what the user typed after ``photostrip`` and return the exit code; no failure is raised."""
-    _seldom_collect_garbage()
-    rest = list(sys.argv[1:] if arguments is None else arguments)
-    debug = _take_flag(rest, "--debug") or os.environ.get("PHOTOSTRIP_DEBUG", "") not in {"", "0"}
-    sys.stdout, sys.stderr = map(_prepared, (sys.stdout, sys.stderr))
-    try:
-        code = _dispatch(rest)
-        sys.stdout.flush()  # a closed pipe shows here, not at the end of the interpreter
-    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (the one place where failures become exit codes)
-        from photostrip.cli.failures import exit_code_of
-
-        return exit_code_of(_cause(error), debug=debug)
-    return code
-
-
-def _cause(error: BaseException) -> BaseException:
-    """Give an interrupt that another error hides: what was being imported then is there in part."""
-    before = error
-    while before.__context__ is not None and not isinstance(before, KeyboardInterrupt):
-        before = before.__context__
-    return before if isinstance(before, KeyboardInterrupt) else error
-
-
-def _seldom_collect_garbage() -> None:
-    """Let the cyclic garbage collector look seldom, and not at all at the end.
-
-    A command loads and makes hundreds of thousands of small objects and hardly a cycle; looking at them again and again
-    takes a tenth of a run.
-    """
+    # a command makes hundreds of thousands of small objects and hardly a cycle; looking at them takes a tenth of a run
     gc.set_threshold(NEW_OBJECTS)
     atexit.register(gc.freeze)
-
-
-def _take_flag(arguments: list[str], flag: str) -> bool:
-    """Remove `flag` wherever it stands before ``--`` and say whether it was there."""
-    end = arguments.index("--") if "--" in arguments else len(arguments)
-    kept = [argument for argument in arguments[:end] if argument != flag]
-    arguments[:end] = kept
-    return len(kept) < end
+    sys.stdout, sys.stderr = map(_prepared, (sys.stdout, sys.stderr))
+    for place, each in enumerate(sys.argv[1:] if arguments is None else arguments, 1):
+        if re.fullmatch(r"(--[\w-]+=)?", each):  # `-o $OUT` without OUT would write into this folder
+            sys.stderr.write(f"error: argument {place} is empty: is a variable of the shell not set?\n")
+            return EXIT_INPUT
+    try:
+        whole(arguments, prog_name="photostrip")
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 0
+    return 0
 
 
 def _prepared(stream: TextIO | None) -> TextIO:
@@ -76,93 +154,6 @@ def _prepared(stream: TextIO | None) -> TextIO:
     if reconfigure is not None:
         reconfigure(errors="replace")
     return stream
-
-
-def _dispatch(arguments: list[str]) -> int:
-    """Answer the options that come before a command, or call the command."""
-    if COMPLETION in os.environ:  # the shell asks what can stand at the cursor
-        from photostrip.cli.jobs.completion import answer
-
-        return answer(os.environ[COMPLETION])
-    first, rest = (arguments[0], arguments[1:]) if arguments else ("", [])
-    if first == "--version":
-        sys.stdout.write(f"photostrip {__version__}\n")
-        return 0
-    if first in {"--help", "-h"}:
-        sys.stdout.write(usage())
-        return 0
-    if not first:
-        sys.stderr.write(usage())
-        return EXIT_USAGE
-    if first not in COMMANDS:
-        return _refuse(first)
-    return _call(first, rest)
-
-
-def _refuse(first: str) -> int:
-    """Say that there is no such command or option, and what may have been meant."""
-    from difflib import get_close_matches
-
-    kind = "option" if first.startswith("-") else "command"
-    known = ["--version", "--help", "--debug"] if kind == "option" else list(COMMANDS)
-    meant = get_close_matches(first, known, n=1)
-    hint = f"did you mean '{meant[0]}'? " if meant else ""
-    _complain(f"no such {kind}: '{first}'; {hint}'photostrip --help' lists what there is")
-    return EXIT_USAGE
-
-
-def _call(name: str, arguments: list[str]) -> int:
-    """Import one command, read its arguments, and run it.
-
-    The function returns its exit code, or None for 0.
-    """
-    for place, each in enumerate(arguments, 1):
-        if not each or (each.startswith("--") and each.find("=") == len(each) - 1):
-            _complain(f"argument {place} of '{name}' is empty: is a variable of the shell not set?")
-            return EXIT_USAGE
-    command = _parser(name, getattr(import_module(COMMANDS[name].module), name))
-    try:  # not command.main(), which has exit codes of its own for interrupts and closed pipes
-        with command.make_context(f"photostrip {name}", arguments) as context:
-            code = command.invoke(context)
-    except Exception as error:  # noqa: BLE001 (what is not typer's is raised again)
-        return _told_by_typer(error, name)
-    return code if isinstance(code, int) else 0
-
-
-def _told_by_typer(error: Exception, name: str) -> int:
-    """Return the exit code of what typer raises, or is raised for it; say what is wrong with the usage."""
-    import typer
-
-    if isinstance(error, typer.Exit):
-        return error.exit_code
-    # the class of every usage error; typer does not export it, but derives BadParameter from it
-    if not isinstance(error, cast("type[Exception]", typer.BadParameter.__base__)):
-        raise error
-    text: str = getattr(error, "format_message", error.__str__)().replace(": Value error, ", ": ")
-    end = "" if text.endswith((".", "?", "!")) else "."
-    _complain(f"{text}{end} 'photostrip {name} --help' shows how it is called.")
-    return EXIT_USAGE
-
-
-@cache  # for a program that calls many commands: typer takes 7 ms for one
-def _parser(name: str, target: Callable[..., object]) -> Command:
-    """Let typer make what reads the arguments of a command."""
-    import typer
-
-    from photostrip.cli.typed_values import read_plainly
-
-    app = target
-    if not isinstance(app, typer.Typer):
-        app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        app.command(name, context_settings=HELP_NAMES)(target)
-    command = typer.main.get_command(app)
-    read_plainly(command)
-    command.epilog = f"\b\nExample:\n  {COMMANDS[name].example}"  # \b: typer keeps the line breaks
-    return command
-
-
-def _complain(message: str) -> None:
-    sys.stderr.write(f"error: {visible(message)}\n")
 
 
 if __name__ == "__main__":

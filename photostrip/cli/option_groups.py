@@ -11,9 +11,9 @@ from typing import Any, get_type_hints
 
 import typer
 
-from photostrip.cli.command_table import HELP_NAMES
 from photostrip.cli.failures import failures_as
 
+HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 Command = Callable[..., None]
 
 

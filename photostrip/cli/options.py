@@ -11,9 +11,10 @@ from photostrip.cli.stdout import Format
 
 
 def _keys(incomplete: str) -> list[str]:
-    from photostrip.cli.jobs.completion import keys
+    """Return the keys of the project file that an assignment may begin with, each with ``=`` behind it."""
+    from photostrip.project.editors import single_keys
 
-    return keys(incomplete)
+    return [f"{path}=" for path in single_keys() if path.startswith(incomplete)]
 
 
 def _page(width: int | None) -> int | None:

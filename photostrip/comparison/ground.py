@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.geodesy.local_frame import meridian_radius, prime_vertical_radius
 from photostrip.notes import Document
 
 

@@ -20,7 +20,7 @@ from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.network.calibration import AFFINE, POINT, PRINCIPAL_DISTANCE, K, P, corrected, corrections
+from photostrip.network.observations import AFFINE, POINT, PRINCIPAL_DISTANCE, K, P, corrected, corrections
 from photostrip.network.problem import BundleCameras
 from photostrip.network.settings import CALIBRATION
 from photostrip.notes import Document

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from photostrip.foreign.adjusted import Adjusted, require_squares
 from photostrip.foreign.project import camera_in_pixels, in_project
 from photostrip.notes import Document
-from photostrip.project.resolved import lines_of
+from photostrip.project.resolved import yaml_text
 from photostrip.project.schema.values import Text
 from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, in_pixels
 
@@ -30,7 +30,7 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
         else:
             require_squares(each.own, "a camera in millimetres")
             cameras[Text(name)] = in_project(each.own)
-    text = "".join(f"{line}\n" for line in (*_found(block.document), *lines_of({"cameras": cameras})))
+    text = "".join(_found(block.document)) + yaml_text({"cameras": cameras})
     return {target: text}, block.said_of_cameras()
 
 
@@ -38,4 +38,4 @@ def _found(document: Document) -> Iterator[str]:
     """Say what the calibration added, with its standard deviations."""
     for each in document.get("bundle", {}).get("calibration", ()):
         named = f"camera {each['camera']}, {each['parameter']}: {each['value']:+g} {each['unit']}"
-        yield f"# {named} by the calibration, standard deviation {each['sigma']:g}; it is in these numbers"
+        yield f"# {named} by the calibration, standard deviation {each['sigma']:g}; it is in these numbers\n"

@@ -16,7 +16,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import separable_angles
 from photostrip.notes import counted
 from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
-from photostrip.project.resolved import lines_of
+from photostrip.project.resolved import yaml_text
 from photostrip.project.schema.values import Text
 from photostrip.strip.image_coordinates.lens_distortion import shift
 from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
@@ -45,7 +45,7 @@ def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, C
         **posed,
         **({} if block.control is None else {"control.csv": _control(block.control)}),
         **({} if block.positions is None else {"positions.csv": _positions(block.photos, block.positions)}),
-        "project.yaml": header + "".join(f"{line}\n" for line in lines_of(project)),
+        "project.yaml": header + yaml_text(project),
     }
 
 

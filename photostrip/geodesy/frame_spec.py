@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from photostrip.errors import Fault
-from photostrip.geodesy.curvature import Ellipsoid
+from photostrip.geodesy.local_frame import Ellipsoid
 
 Kind = Literal["projected", "geographic", "geocentric", "local"]
 

@@ -20,9 +20,16 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Flags, Floats, pieces
 from photostrip.errors import Fault, GeometryError, InputError, PhotostripError
-from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
-from photostrip.geodesy.local_frame import geocentric_columns, geocentric_from_geodetic, geodetic_from_geocentric
+from photostrip.geodesy.local_frame import (
+    Ellipsoid,
+    curvature_correction,
+    geocentric_columns,
+    geocentric_from_geodetic,
+    geodetic_from_geocentric,
+    meridian_radius,
+    prime_vertical_radius,
+)
 from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, wrapped_longitude
 from photostrip.notes import named
 

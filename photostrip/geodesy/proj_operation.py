@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.geodesy.curvature import EARTH_RADIUS
+from photostrip.geodesy.local_frame import EARTH_RADIUS
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from photostrip.errors import Fault, InputError, PhotostripError
 from photostrip.geodesy.crs import CrsParts, missing_named_grids, read_crs
-from photostrip.geodesy.curvature import Ellipsoid
 from photostrip.geodesy.frame_spec import FrameSpec, Refusal, contradictions
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.local_frame import Ellipsoid
 from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, missing_grids, trouble_with
 
 _SAME_AXIS = 1e-10  # relative: two semi-axes are the same within 0.6 mm on the Earth

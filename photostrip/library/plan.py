@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from photostrip.library.project import assignments_of, reading_from
 from photostrip.notes import Document
+from photostrip.planning import PlanKind
 
-PlanKind = Literal["model", "strip", "camera", "displacement", "screening"]
+if TYPE_CHECKING:
+    from photostrip.sheets.sheet import Sheet
 
 
+@dataclass(frozen=True, repr=False)
 class Plan:
     """What a plan lets expect."""
 
-    def __init__(self, document: Document, files: Iterable[str] = ()) -> None:
-        self.document = document
+    sheet: Sheet
+    files: Sequence[str]  # every file that was read
+
+    @property
+    def document(self) -> Document:
         """What ``photostrip plan --format json`` prints."""
-        self.files = tuple(files)
-        """Every file that was read."""
+        return self.sheet.document()
 
     def report(self, form: Literal["text", "md"] = "text") -> str:
         """Return the plan as text or Markdown."""
-        from photostrip.report.commands.plans.report import plan_report
-        from photostrip.report.page.text import to_markdown, to_text
-
-        return (to_markdown if form == "md" else to_text)(*plan_report(self.document))
+        return self.sheet.rendered(form)
 
     def __repr__(self) -> str:
         """Return the report: a plan is small."""
@@ -59,41 +62,42 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
     """Read a plan from its file, or from assignments to its keys alone, and compute it."""
     match kind:
         case "model":
-            from photostrip.formats.output.plans.model import model_document
-            from photostrip.planning.model.plan import given_errors, plan_model
+            from photostrip.planning.model_plan import both_forms, given_errors, plan_model
             from photostrip.project.plans.model import load_model_plan
+            from photostrip.sheets.model_plan import model_sheet
 
             model = load_model_plan(path, assignments)
-            document = model_document(model.name, model.camera, plan_model(model.spec), given_errors(model.spec), None)
-            return Plan(document, model.files)
+            spec, printed = model.spec, model.closed_form == "printed"
+            forms = None if model.closed_form == "no" else both_forms(spec)
+            forecast, errors = plan_model(spec), given_errors(spec)
+            return Plan(model_sheet(model.name, model.camera, forecast, errors, forms, printed=printed), model.files)
         case "strip":
-            from photostrip.formats.output.plans.strip import strip_document
             from photostrip.project.plans.strip import load_strip_plan
+            from photostrip.sheets.strip_plan import strip_sheet
 
             strip = load_strip_plan(path, assignments)
-            return Plan(strip_document(strip.name, strip.computed()), strip.reading.files)
+            return Plan(strip_sheet(strip.name, strip.computed()), strip.reading.files)
         case "camera":
             from photostrip.errors import Fault, InputError
-            from photostrip.formats.output.plans.cameras import camera_document
             from photostrip.project.plans.cameras import load_camera_plan
+            from photostrip.sheets.plans import camera_sheet
 
             if path is None:
-                raise InputError(Fault("no cameras are given", "plan-cameras", fix="give a file or a mapping"))
+                raise InputError(Fault("no cameras are given", "plan-cameras", fix="name a YAML file"))
             cameras = load_camera_plan(path, assignments)
-            document = camera_document(cameras.name, cameras.cameras, cameras.reference, cameras.survey)
-            return Plan(document, cameras.files)
+            return Plan(camera_sheet(cameras.name, cameras.cameras, cameras.reference, cameras.survey), cameras.files)
         case "displacement":
-            from photostrip.formats.output.plans.displacement import displacement_document
             from photostrip.project.plans.displacement import load_displacement_plan
+            from photostrip.sheets.plans import displacement_sheet
 
             survey = load_displacement_plan(path, assignments)
-            return Plan(displacement_document(survey.name, survey.spec), survey.files)
+            return Plan(displacement_sheet(survey.name, survey.spec), survey.files)
         case "screening":
-            from photostrip.formats.output.plans.screening import screening_document
             from photostrip.planning.screening import screening_experiment
             from photostrip.project.plans.screening import load_screening_plan
+            from photostrip.sheets.plans import screening_sheet
 
             experiment = load_screening_plan(path, assignments)
-            return Plan(screening_document(experiment.name, screening_experiment(experiment.spec)), experiment.files)
+            return Plan(screening_sheet(experiment.name, screening_experiment(experiment.spec)), experiment.files)
     message = f"there is no plan {kind!r}: model, strip, camera, displacement or screening"
     raise ValueError(message)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.formats.text.writing import Content
     from photostrip.library.table import Table
     from photostrip.pipeline.results import Result as Computed
+    from photostrip.report.pictures.svg import Picture
 
 ReportForm = Literal["text", "md", "html", "json"]
 RESULT, PAGE = "result.json", "report.html"
@@ -162,7 +163,7 @@ class Result:
         if self.computed is None:
             message = "a saved result holds no covariances between points"
             raise InputError(Fault(message, "result-saved", fix="run the project again"))
-        from photostrip.pipeline.precision.joint_points import joint_covariance
+        from photostrip.pipeline.precision import joint_covariance
 
         point_ids = self.computed.refined.observations.point_ids
         place = {point_ids[number]: row for row, number in enumerate(self.computed.points.number.tolist())}
@@ -248,11 +249,11 @@ class Result:
 
         return exported(self.document, self._exports).files
 
-    def pictures(self) -> dict[str, str]:
-        """Return the pictures of the report as SVG, content by file name."""
-        from photostrip.report.pictures.result.pictures import picture_files
+    def pictures(self) -> dict[str, Picture]:
+        """Return the pictures of the report by name: a notebook shows them, ``file()`` is the SVG of one."""
+        from photostrip.report.pictures.result import pictures_of
 
-        return picture_files(self.document)
+        return {picture.name: picture for picture in pictures_of(self.document)}
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.

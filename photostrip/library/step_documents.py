@@ -15,7 +15,7 @@ from photostrip.library.step_arguments import sigma0_of
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
 from photostrip.notes import Document
 from photostrip.strip.relative_orientation.solution import ELEMENTS
-from photostrip.strip.resection.closed_form import OrientedPhoto
+from photostrip.strip.resection import OrientedPhoto
 from photostrip.strip.strip_formation.intersection import Intersection
 from photostrip.units import MICROMETRES
 

@@ -16,11 +16,9 @@ from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
 from photostrip.notes import Document
 from photostrip.result.trace.replay import first_rounds
 from photostrip.strip.image_coordinates.corrections import Bending, undistort
-from photostrip.strip.polynomial.terms import columns as design_columns
+from photostrip.strip.polynomial_terms import columns as design_columns
 from photostrip.strip.relative_orientation.solution import ELEMENTS
-from photostrip.strip.resection.closed_form import OrientedPhoto, approximate
-from photostrip.strip.resection.collinearity import KnownPhotos, project
-from photostrip.strip.resection.resection import resect
+from photostrip.strip.resection import KnownPhotos, OrientedPhoto, approximate, project, resect
 from photostrip.strip.strip_formation.intersection import lies_across
 from photostrip.units import MICROMETRES
 

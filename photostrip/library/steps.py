@@ -24,7 +24,7 @@ from photostrip.library.steps_of_strips import Absolute, Bundle, Strip, absolute
 from photostrip.strip.image_coordinates.corrections import Bending, refraction_constant, undistort
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-from photostrip.strip.resection.closed_form import OrientedPhoto, space_resection
+from photostrip.strip.resection import OrientedPhoto, space_resection
 from photostrip.strip.strip_formation.intersection import Intersection, intersect
 from photostrip.strip.strip_formation.strip import hand_on_rotations
 

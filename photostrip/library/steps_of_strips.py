@@ -14,18 +14,11 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.library.step_arguments import Rays, of_rays, rows, same, sigma0_of
+from photostrip.network.adjustment import IterationStep, solve
 from photostrip.network.cofactors import cofactors_of
-from photostrip.network.problem import (
-    BundleCameras,
-    BundleProblem,
-    ControlObservations,
-    ImageObservations,
-    StartValues,
-)
-from photostrip.network.solution import IterationStep
-from photostrip.network.solve import solve
+from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.points import PhotoPoints
-from photostrip.strip.polynomial.terms import POWERS, columns
+from photostrip.strip.polynomial_terms import POWERS, columns
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings

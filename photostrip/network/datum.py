@@ -11,8 +11,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-from photostrip.network.parameters import PreparedProblem
-from photostrip.network.problem import BundleProblem, Parameters
+from photostrip.network.problem import BundleProblem, Parameters, PreparedProblem
 
 DEFECT = SIMILARITY_PARAMETERS
 # photos, part: of 250, 500, 1000 and 1e-4, 1e-6, 1e-8 what comes nearest to all photos held by 1e-10, at 10 000 photos

@@ -13,14 +13,9 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.network import datum
-from photostrip.network.given_orientations import (
-    LinearisedOrientations,
-    attitudes_at,
-    positions_at,
-)
 from photostrip.network.normal_equations import NormalEquations, factored, linearise
-from photostrip.network.parameters import PreparedProblem
-from photostrip.network.problem import BundleProblem, Parameters
+from photostrip.network.observations import LinearisedOrientations, attitudes_at, positions_at
+from photostrip.network.problem import BundleProblem, Parameters, PreparedProblem
 from photostrip.notes import counted, named
 
 SQUARED_SINE = 1e-10  # square of the sine of the angle between rays

@@ -22,13 +22,12 @@ import numpy as np
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, K, P, values_of
-from photostrip.network.calibration import POINT as PRINCIPAL_POINT
+from photostrip.network.adjustment import BundleSolution, Cofactors
 from photostrip.network.normal_equations import Columns, Explained
+from photostrip.network.observations import AFFINE, PRINCIPAL_DISTANCE, K, P, by_calibration, values_of
+from photostrip.network.observations import POINT as PRINCIPAL_POINT
 from photostrip.network.problem import BundleProblem, ControlObservations, PositionObservations, StartValues
-from photostrip.network.rays import by_calibration
 from photostrip.network.settings import CALIBRATION
-from photostrip.network.solution import BundleSolution, Cofactors
 
 ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
 LENS, EDGE, DECENTRED = "lens distortion", "lens distortion at the edge", "decentred lens"

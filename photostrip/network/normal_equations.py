@@ -16,14 +16,8 @@ from scipy.sparse import bsr_array, csr_array
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.band import Band
-from photostrip.network.given_orientations import (
-    LinearisedOrientations,
-    attitudes_at,
-    positions_at,
-)
-from photostrip.network.parameters import PreparedProblem
-from photostrip.network.problem import ImageObservations, ModelObservations, Parameters
-from photostrip.network.rays import Rays, view
+from photostrip.network.observations import LinearisedOrientations, Rays, attitudes_at, positions_at, view
+from photostrip.network.problem import ImageObservations, ModelObservations, Parameters, PreparedProblem
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,25 +2,29 @@
 
 The residual ``v`` of an observation of standard deviation ``sigma`` has the variance ``r sigma^2``, r its redundancy
 number: the share of an error of the observation that shows in its own residual.
+
+Variance components: how good each kind of observation really is, out of its own residuals.
+
+The stated variances of a group are multiplied with the ratio of the weighted sum of squares of its residuals and its
+share of the redundancy, until the ratios are one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import EllipsisType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
+from photostrip.network.adjustment import BundleSolution, Cofactors
+from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import BundleSettings
 from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
-
-if TYPE_CHECKING:
-    from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution, Cofactors
 
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
 SIGMA0_LEVEL = 0.05  # at which a search takes stated standard deviations for too small
@@ -160,12 +164,21 @@ class Limit(NamedTuple):
 
     value: float  # largest standardised residual of a coordinate
     both: float  # the same of a point on two photos, which loses both rays
-    alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
+    given: float  # the same of a given coordinate, of which wrong rays say nothing
+    alpha: float  # probability that the test of one good coordinate of a ray, or of rays that agree, rejects them
+    alpha_of_given: float  # that of one good given coordinate does
     unit: float  # standard deviation of unit weight in force
 
     def of(self, rays: Numbers | int) -> Floats:
         """Largest standardised residual by number of rays of the point."""
         return np.where(rays == 2, self.both, self.value)
+
+    def shifts(self, power: float) -> dict[str, float]:
+        """Give ``noncentrality`` for each kind of observation."""
+        return {
+            kind: noncentrality(self.alpha if kind == IMAGE else self.alpha_of_given, power)
+            for kind in (IMAGE, CONTROL, POSITION, ATTITUDE)
+        }
 
 
 def tests_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> int:
@@ -174,19 +187,121 @@ def tests_of(problem: BundleProblem, solution: BundleSolution, precision: Cofact
 
 
 def limit_of(
-    solution: BundleSolution, settings: BundleSettings, tests: int, established: int, share_of_both: float = 1.0
+    solution: BundleSolution,
+    settings: BundleSettings,
+    tests: int,
+    established: tuple[int, int],
+    share_of_both: float = 1.0,
 ) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow.
 
     Without errors all tests together have the level q of the settings. With many errors q is the part of the rejections
     that are false: with k of m hypotheses rejected the next is tested at i q / (m + 1 - i (1 - q)), i = k + 1, and
-    m - k tests are left. Source: [Gavrilov 2009].
+    m - k tests are left. Source: [Gavrilov 2009]. Rays and given coordinates are counted apart: that many rays are
+    wrong says nothing of control.
 
+    established: rejections of points, by their rays, and of given coordinates.
     share_of_both: what the test of a point on two photos has of the level of one test.
     """
     found = settings.test == "tau" and sigma0_test(solution).too_large
-    share = settings.level * (established + 1)
-    alpha = share / (max(tests, 1) + share) if settings.alpha is None else settings.alpha
+    shares = (settings.level * (rejected + 1) for rejected in established)
+    alpha, of_given = (
+        share / (max(tests, 1) + share) if settings.alpha is None else settings.alpha for share in shares
+    )
     test, unit = ("tau", solution.sigma0) if found else ("baarda", 1.0)
-    value, both = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both))
-    return Limit(value=value, both=both, alpha=alpha, unit=unit)
+    value, both, given = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both, of_given))
+    return Limit(value=value, both=both, given=given, alpha=alpha, alpha_of_given=of_given, unit=unit)
+
+
+LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it
+ITERATIONS = 12
+CONVERGED = 0.005  # relative change of a standard deviation
+LEAST_FACTOR, MOST_FACTOR = 0.05, 20.0  # factors of a stated standard deviation in one step: rounding of a perfect fit
+
+
+@dataclass(frozen=True)
+class Component:
+    """The standard deviations of one group."""
+
+    # ``image``, ``control plan``, ``control height``, ``control``, ``positions plan``, ``positions height`` or
+    # ``attitudes``
+    name: str
+    observations: int
+    redundancy: float
+    factor: float  # what its stated standard deviations are to be multiplied with; 1 when it was not estimated
+    sigma: float  # relative standard deviation of the factor
+    estimated: bool  # whether its redundancy was enough
+
+
+def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice | Flags]]:
+    """Split a kind of observations into groups of their own variance: name, and coordinates (rows, 3).
+
+    ``level``: whether the axes of a row are plan and height; others, as of geocentric coordinates, stay one group.
+    """
+    if kind not in {CONTROL, POSITION}:
+        return [(kind if kind == IMAGE else "attitudes", slice(None))]
+    name = "control" if kind == CONTROL else "positions"
+    flat = np.array(level, bool).reshape(rows, 1)
+    height = np.arange(3) == 2
+    return [(f"{name} plan", flat & ~height), (f"{name} height", flat & height), (name, ~flat & np.ones(3, bool))]
+
+
+def components(
+    problem: BundleProblem, solution: BundleSolution, precision: Cofactors, level: Mapping[str, Sequence[bool]]
+) -> tuple[Component, ...]:
+    """Compare each group's residuals with its standard deviations, once: factor^2 = v^T P v / r of the group.
+
+    ``level`` says for ``control`` and ``position`` whether the axes of each row are plan and height. Groups without
+    observations are left out. Source: [Förstner 1979], the simplified form of Helmert's estimation.
+    """
+    found = []
+    for group in groups_of(problem, solution, precision):
+        for name, where in labels(group.kind, len(group.error), level.get(group.kind, ())):
+            given = np.isfinite(group.sigma)
+            if not isinstance(where, slice):
+                given &= where
+            if given.any():
+                found.append(_component(name, group, given))
+    return tuple(found)
+
+
+def _component(name: str, group: Group, given: Flags) -> Component:
+    squares = float(((group.error[given] / group.sigma[given]) ** 2).sum())
+    redundancy = float(group.redundancy[given].sum())
+    estimated = redundancy >= LEAST_REDUNDANCY
+    factor = float(np.clip(np.sqrt(squares / redundancy), LEAST_FACTOR, MOST_FACTOR)) if estimated else 1.0
+    sigma = float(1 / np.sqrt(2 * redundancy)) if estimated else float("nan")
+    return Component(
+        name=name, observations=int(given.sum()), redundancy=redundancy, factor=factor, sigma=sigma, estimated=estimated
+    )
+
+
+def scaled(problem: BundleProblem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> BundleProblem:
+    """Multiply the standard deviations of a problem with the factors of their groups."""
+    factor = {each.name: each.factor for each in found}
+
+    def with_factors(kind: str, sigma: Floats) -> Floats:
+        result = sigma.copy()
+        for name, where in labels(kind, len(sigma), level.get(kind, ())):
+            if name in factor:
+                result[where] = result[where] * factor[name]
+        return result
+
+    return replace(
+        problem,
+        images=replace(problem.images, sigma=with_factors(IMAGE, problem.images.sigma)),
+        control=replace(problem.control, sigma=with_factors(CONTROL, problem.control.sigma)),
+        positions=replace(problem.positions, sigma=with_factors(POSITION, problem.positions.sigma)),
+        attitudes=replace(problem.attitudes, sigma=with_factors(ATTITUDE, problem.attitudes.sigma)),
+    )
+
+
+def combined(before: Sequence[Component], step: Sequence[Component]) -> tuple[Component, ...]:
+    """Multiply the factors of a step onto those found before; redundancies are those of the last step."""
+    known = {each.name: each.factor for each in before}
+    return tuple(replace(each, factor=each.factor * known.get(each.name, 1.0)) for each in step)
+
+
+def converged(step: Sequence[Component]) -> bool:
+    """Whether a step changes nothing worth another adjustment."""
+    return all(abs(each.factor - 1.0) < CONVERGED for each in step)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.network.calibration import PRINCIPAL_DISTANCE, corrected, values_of
+from photostrip.network.adjustment import BundleSolution, Cofactors
+from photostrip.network.observations import PRINCIPAL_DISTANCE, corrected, values_of
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import CALIBRATION
-from photostrip.network.solution import BundleSolution, Cofactors
 from photostrip.statistics import t_p_value
 
 SIGNIFICANCE = 0.05

@@ -1,4 +1,7 @@
-"""Points of all strips together: the mean where strips share a point, and their differences there."""
+"""Points of all strips together: the mean where strips share a point, and their differences there.
+
+Points that were measured and have no coordinates.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,12 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.precision import photo_precision, strip_precision
+from photostrip.pipeline import precision
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.pipeline.strips.notes import precision_of_long_strip
 from photostrip.pipeline.strips.photos_on_control import ScreenedPhotos
-from photostrip.plausibility.photos.tied_strips import TiesOfStrips
+from photostrip.plausibility.ids import TiesOfStrips
 from photostrip.points import ControlPoints, PhotoPoints
 
 
@@ -38,15 +41,15 @@ def join_photos(
     of_checks: whether the precision of check points alone is wanted.
     """
     joined = join_strips(strips, observations, output)
-    too_long = [strip for strip in strips if photo_precision.too_long(strip) and not of_checks]
+    too_long = [strip for strip in strips if precision.too_long(strip) and not of_checks]
     if too_long or not settings.precision:
-        notes = (precision_of_long_strip(strip.of_photos.strip, photo_precision.MOST_PHOTOS) for strip in too_long)
+        notes = (precision_of_long_strip(strip.of_photos.strip, precision.MOST_PHOTOS) for strip in too_long)
         return replace(joined, notes=(*notes, *joined.notes)) if settings.precision else joined
     each = [
-        photo_precision.of_photos(strip, before.photos, observations, given, of_checks=of_checks)
+        precision.of_photos(strip, before.photos, observations, given, of_checks=of_checks)
         for strip, before in zip(strips, screened, strict=True)
     ]
-    return replace(joined, precision=strip_precision.joined(each, strips, joined.points))
+    return replace(joined, precision=precision.joined(each, strips, joined.points))
 
 
 def join_strips(strips: tuple[StripResult, ...], observations: PhotoPoints, output: GroundFrame) -> AdjustedStrips:
@@ -134,3 +137,36 @@ def _ties(strips: Sequence[StripResult], output: GroundFrame) -> Ties:
     if len(second):
         difference = np.einsum("nij,nj->ni", output.axes_at(cartesian[second]), difference)
     return Ties(point[second], np.column_stack([strip[second - 1], strip[second]]), difference)
+
+
+def not_determined(
+    observations: PhotoPoints, points: Adjusted, inputs: Inputs, strips: Sequence[StripResult]
+) -> dict[str, str]:
+    """Points that were measured and have no coordinates, with the reason."""
+    done = np.zeros(len(observations.point_ids), bool)
+    done[points.number] = True
+    if inputs.models is not None:
+        why = "coordinates in the models contradict each other, or were left out"
+        return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
+    placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
+    wrong = [each for strip in strips for each in strip.of_photos.wrong_rays]
+    contradicted = {int(observations.point[each.row]): each.kind == "control" for each in wrong}
+    on_photos: dict[int, list[tuple[int, int]]] = {}
+    for row in np.flatnonzero(~done[observations.point]):
+        photo = observations.photo_ids[observations.photo[row]]
+        if photo in placed:
+            on_photos.setdefault(int(observations.point[row]), []).append(placed[photo])
+    return {
+        observations.point_ids[point]: _reason(places, by_control=contradicted.get(point))
+        for point, places in sorted(on_photos.items())
+    }
+
+
+def _reason(places: list[tuple[int, int]], *, by_control: bool | None) -> str:
+    """Put it in words; by_control: whether its given coordinates contradict a ray, None where nothing does."""
+    if len(places) == 1:
+        return "measured on one photo only"
+    if by_control is not None:
+        return "its given coordinates contradict one of its two rays" if by_control else "rays contradict each other"
+    neighbours = any((n, k + 1) in places for n, k in places)
+    return "rejected in every pair" if neighbours else "not on two neighbouring photos of one strip"

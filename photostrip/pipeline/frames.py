@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.local_frame import curvature_correction
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
-from photostrip.pipeline.inputs import AUTO, Inputs, Settings
-from photostrip.pipeline.refusals import refuse_curvature_twice
+from photostrip.pipeline.inputs import AUTO, Inputs, Settings, refuse_curvature_twice
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import StripResult

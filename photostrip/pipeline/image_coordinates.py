@@ -69,8 +69,7 @@ def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, gr
     # a check, which asks for no heights, does without the fifty modules of a strip
     from photostrip.pipeline.common_points import mean_points
     from photostrip.pipeline.given_points import measured_control
-    from photostrip.pipeline.strips.adjusting import adjust_formed
-    from photostrip.pipeline.strips.forming import form_photos
+    from photostrip.pipeline.strips.method import adjust_formed, form_photos
 
     control = measured_control(inputs.control, observations)
     formed = form_photos(inputs, observations, settings)

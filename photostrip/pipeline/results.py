@@ -16,26 +16,26 @@ from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip import absolute_orientation as absolute
-from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.polynomial import Polynomial
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.network import reliability, self_calibration, variance_components
-    from photostrip.network.correlations import Correlation
-    from photostrip.network.gross_errors.snooping import ScreenedBundle
+    from photostrip.network import reliability, self_calibration
+    from photostrip.network.adjustment import Selection
+    from photostrip.network.cofactors import Correlation
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.selection import Selection
-    from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
-    from photostrip.strip.error_propagation.check_errors import CheckErrors
-    from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.strip.gross_errors.pairs import screening
+    from photostrip.network.snooping import ScreenedBundle
+    from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights
+    from photostrip.strip import resection as exterior
+    from photostrip.strip.fitted_strip import CheckErrors
+    from photostrip.strip.gross_errors import pair_screening
+    from photostrip.strip.gross_errors.control_screening import ScreenedControl
     from photostrip.strip.image_coordinates import corrections
     from photostrip.strip.image_coordinates.interior import InteriorOrientation
     from photostrip.strip.independent_models.formation import FormedModels
-    from photostrip.strip.resection import resection as exterior
 
 ROLES = NEW, CONTROL, CHECK = "new", "control", "check"
 
@@ -47,7 +47,7 @@ class PhotoStages:
     strip: Strip
     sigma: float  # median standard deviation of its image coordinates, mm
     # relative orientation of its pairs with the search for gross errors: log, zones, detectable errors
-    screened: screening.ScreenedPairs
+    screened: pair_screening.ScreenedPairs
     formed: FormedStrip
     wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
     resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
@@ -243,7 +243,7 @@ class Bundle:
     screened: ScreenedBundle  # the solution and how it was cleaned
     groups: tuple[reliability.Group, ...]  # observations that took part with their redundancy numbers
     sigma0: reliability.Sigma0Test  # test of sigma0, with the stated standard deviations
-    components: tuple[variance_components.Component, ...]  # variance components; empty when none were asked for
+    components: tuple[reliability.Component, ...]  # variance components; empty when none were asked for
     parameters: tuple[self_calibration.Parameter, ...]
     # correlations above 0.95: of parameters that photos share with each other and with the photo where it is largest,
     # and the largest within photos

@@ -12,21 +12,17 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.block.adjust import adjust_block
 from photostrip.pipeline.block.datum import FormedStrips
-from photostrip.pipeline.block.own_frame import laid_on_ground
-from photostrip.pipeline.common_points import join_photos, join_strips
+from photostrip.pipeline.block.start import laid_on_ground
+from photostrip.pipeline.common_points import join_photos, join_strips, not_determined
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
-from photostrip.pipeline.given_points import compare_with_given, measured_control
+from photostrip.pipeline.given_points import compare_with_given, measured_control, unchecked_control_notes
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
-from photostrip.pipeline.inputs import AUTO, BUNDLE, POLYNOMIAL, Inputs, Settings
-from photostrip.pipeline.not_determined import not_determined
+from photostrip.pipeline.inputs import AUTO, BUNDLE, POLYNOMIAL, Inputs, Settings, require_runnable, require_whole
 from photostrip.pipeline.plausibility import gate
-from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
-from photostrip.pipeline.strips.adjusting import adjust_formed, adjust_photos
-from photostrip.pipeline.strips.forming import as_single_photos, form_strips
+from photostrip.pipeline.strips.method import adjust_formed, adjust_photos, as_single_photos, form_strips
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.pipeline.strips.photos_on_control import on_control
-from photostrip.pipeline.unchecked_control import unchecked_control_notes
 from photostrip.points import PhotoPoints
 
 

@@ -1,8 +1,7 @@
 """The plausibility gate: mistakes in the data that residuals hide, found, named and explained, never repaired.
 
 In come image coordinates, strips formed of them, and given points; out come findings. ``finding`` says what can be
-found, and with which code, ``causes`` what competes in an adjustment; ``photos`` looks at photos and their points,
-``control`` at what is given on the ground.
+found, and with which code, and what competes in an adjustment.
 Nothing here raises for a mistake in the data: the gate must go on to report the others.
 """
 

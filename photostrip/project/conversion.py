@@ -17,9 +17,9 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.measured.exterior import ROTATIONS
 from photostrip.formats.measured.measurements import Measurements
-from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84, GroundFrame
+from photostrip.geodesy.local_frame import mean_radius, radius_in_azimuth
 from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints, concatenated
@@ -28,8 +28,8 @@ from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPho
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
 from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
 from photostrip.project.schema.sections import Section
-from photostrip.strip.image_coordinates import certificate
-from photostrip.strip.image_coordinates.certificate import Certificate
+from photostrip.strip.image_coordinates import fiducial_marks
+from photostrip.strip.image_coordinates.fiducial_marks import Certificate
 from photostrip.strip.strip_formation import strip
 from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 
@@ -69,7 +69,7 @@ def certificate_of(given: Camera | PixelCamera) -> Certificate | None:
         return None
     nominal = dict(given.fiducials) if given.fiducials else None
     distances = [(str(first), str(second), length) for first, second, length in given.fiducial_distances]
-    return certificate.solve(distances, nominal=nominal, places=given.fiducial_places)
+    return fiducial_marks.solve(distances, nominal=nominal, places=given.fiducial_places)
 
 
 def _camera(name: str, given: Camera | PixelCamera) -> camera.Camera:
@@ -416,14 +416,14 @@ def settings(project: ProjectFile) -> Settings:
         ),
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,
-        tolerances={name: limit for name, limit in project.tolerances.values().items() if limit is not None},
+        tolerances={name: limit for name, limit in project.tolerances if limit is not None},
         accept=tuple(map(str, project.accept)),
     )
 
 
 def _laid_over(usual: T, given: Section) -> T:
     """Replace the fields of settings by the keys of a section that has the same names."""
-    changed = given.values()
+    changed = dict(given)
     for name, value in changed.items():
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))

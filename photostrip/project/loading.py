@@ -34,7 +34,6 @@ from photostrip.project.schema.cameras import Camera as CameraBlock
 from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
-from photostrip.project.schema.sections import read_section
 from photostrip.project.tables import Tables, check_tables, in_one_zone, measured_photos, read_tables
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
@@ -242,10 +241,10 @@ def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenLis
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
     """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
-    from photostrip.pipeline.plausibility import image_evidence  # a project without faults is examined as a whole
+    from photostrip.pipeline.plausibility import image_evidence
 
     root, measured = reading.root, tables.observations
-    given = read_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)}, [])
+    given = valid_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)})
     if given is None or measured is None or {each.camera for each in given.groups} - set(given.cameras):
         return ()
     read = Tables(observations=_whole(measured), fiducials=tables.fiducials and _whole(tables.fiducials), control=[])

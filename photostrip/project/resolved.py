@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
@@ -38,8 +38,7 @@ OF_PHOTOS = (
     "interior",
 )
 OF_MODELS = ("links",)  # what the other kind of measurements has no use for
-LONGEST_LINE = 110
-_NOT_PRINTED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+LONGEST_LINE = 100
 
 
 def completed(project: ProjectFile, root: Node, path: str, measured: Sequence[str] = ()) -> ProjectFile:
@@ -82,7 +81,7 @@ def completed(project: ProjectFile, root: Node, path: str, measured: Sequence[st
         if (each := getattr(project, name)) is not None
     }
     spec = output_spec(project.output, first_frame(project)) or first_frame(project)
-    ellipsoid = None if spec.ellipsoid is None else Ellipsoid(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
+    ellipsoid = None if spec.ellipsoid is None else Ellipsoid.model_construct(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
     output = project.output.changed(
         crs=Text(spec.crs),
         axes=spec.axes,
@@ -130,14 +129,14 @@ def text_of(project: ProjectFile) -> str:
     plain = _plain(project)
     for name in OF_PHOTOS if project.models is not None else OF_MODELS:
         plain["processing"].pop(name, None)
-    return HEADER + "".join(f"{line}\n" for line in lines_of(plain))
+    return HEADER + yaml_text(plain)
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     """Turn sections into mappings, without keys that say nothing."""
     if isinstance(value, Section):
         skipped = ("k0", "k", "p", "b") if isinstance(value, Distortion) and value.model == "radial-table" else ()
-        fields = ((name, getattr(value, name)) for name in type(value).keys if name not in skipped)
+        fields = ((name, each) for name, each in value if name not in skipped)
         return {
             name: "auto" if each is None else _plain(each)
             for name, each in fields
@@ -148,44 +147,24 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
-def lines_of(mapping: dict[str, Any], indent: str = "") -> Iterator[str]:
-    """Write mappings, lists and values as the lines of a project file; what is to be quoted is a ``Text``."""
-    for name, value in mapping.items():
-        begin = f"{indent}{_scalar(name)}:"
-        if isinstance(value, dict) and value:
-            yield begin
-            yield from lines_of(value, indent + "  ")
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
-            yield begin
-            for each in value:
-                first, *rest = lines_of(each, indent + "    ")
-                yield f"{indent}  - {first.strip()}"
-                yield from rest
-        elif isinstance(value, list):
-            yield from _row(begin, [_scalar(each) for each in value])
-        else:
-            yield f"{begin} {_scalar(value) if value != {} else '{}'}"
+class _Writer(yaml.SafeDumper):
+    """Writes lists of values in brackets, and what the user chose between quotation marks."""
+
+    def ignore_aliases(self, _data: object) -> bool:
+        return True
 
 
-def _row(begin: str, words: list[str]) -> Iterator[str]:
-    """Return a list of values in brackets, broken into lines where it is long."""
-    line, indent = f"{begin} [", " " * (len(begin) - len(begin.lstrip()) + 2)
-    for number, word in enumerate(words):
-        end = "]" if number == len(words) - 1 else ", "
-        if len(line) + len(word) + len(end) > LONGEST_LINE:
-            yield line.rstrip()
-            line = indent
-        line += word + end
-    yield line if words else f"{line}]"
+def _list(writer: _Writer, value: list[Any]) -> yaml.Node:
+    inside = not any(isinstance(each, dict) for each in value)
+    return writer.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=inside)
 
 
-def _scalar(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Text):
-        quoted = json.dumps(value, ensure_ascii=False)
-        return _NOT_PRINTED.sub(lambda found: f"\\u{ord(found[0]):04x}", quoted)
-    text = repr(value) if isinstance(value, float) else str(value)
-    if isinstance(value, float) and "e" in text and "." not in text:
-        text = text.replace("e", ".0e")  # a number for all readers of YAML
-    return text
+_Writer.add_representer(list, _list)
+_Writer.add_representer(Text, lambda writer, text: writer.represent_scalar("tag:yaml.org,2002:str", text, style='"'))
+
+
+def yaml_text(mapping: dict[str, Any]) -> str:
+    """Write mappings, lists and values as a project file; a ``Text`` is a text for all readers of YAML."""
+    return yaml.dump(
+        mapping, Dumper=_Writer, sort_keys=False, allow_unicode=True, default_flow_style=False, width=LONGEST_LINE
+    )

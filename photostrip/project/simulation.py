@@ -251,8 +251,7 @@ def _spec(given: SimulationFile) -> simulation.Spec:
 
 def _fields(section: Section, **others: object) -> dict[str, Any]:
     """Values of a section by key, texts as plain texts, and others in place of its own."""
-    values = {name: getattr(section, name) for name in type(section).keys}
-    return {name: str(value) if isinstance(value, str) else value for name, value in values.items()} | others
+    return {name: str(value) if isinstance(value, str) else value for name, value in section} | others
 
 
 def camera_of(given: SimulatedCamera) -> camera.Camera:

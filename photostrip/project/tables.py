@@ -260,7 +260,7 @@ def in_one_zone(
     for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
         if not given.other_zone:
             continue
-        from photostrip.geodesy.zones import FEWEST_COMMON, join_zones  # few projects have two zones
+        from photostrip.geodesy.crs import FEWEST_COMMON, join_zones
 
         place = ("control", number, "other_zone")
         if number == 0:

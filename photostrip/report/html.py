@@ -17,8 +17,8 @@ from photostrip.report.commands.batch import batch_page_sections
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.links import link
 from photostrip.report.page.parts import Facts, Part, Section, Table, Words
-from photostrip.report.pictures.batch_map import batch_maps
-from photostrip.report.pictures.result.pictures import SECTIONS, pictures_of
+from photostrip.report.pictures.batch import batch_maps
+from photostrip.report.pictures.result import SECTIONS, pictures_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.accuracy_report import named_sections, title_of
 from photostrip.visible import visible
@@ -106,7 +106,7 @@ def _place(sections: list[Document], pictures: Sequence[Picture]) -> None:
     of_name = {section["name"]: section for section in sections}
     ground: Document = {"name": "", "id": "pictures", "title": "Pictures", "parts": [], "pictures": []}
     for each in pictures:
-        section = next((of_name[name] for name in SECTIONS.get(each.name, ()) if name in of_name), ground)
+        section = of_name.get(SECTIONS.get(each.name, ""), ground)
         drawn = each._asdict() | {"svg": Markup(each.svg), "findings": []}  # noqa: S704 (escaped there)
         section["pictures"].append(drawn)
     if pictures:

@@ -1,9 +1,8 @@
 """Strips of photos with known truth: what would be measured, and what it should give.
 
 In comes a ``Spec``, out go observations, control and truth, without rounding. ``draws`` gives random numbers that are
-the same on every machine; ``ground`` the world and its terrain, ``flight`` the photos and what they show,
-``placement`` the points, ``film`` its deformation, ``plotter`` independent models, ``control`` given points, ``gross``
-gross errors, ``validation`` what cannot be simulated.
+the same on every machine; ``flight`` the world and what photos show of it, ``placement`` the points and the control,
+``measuring`` film, models of a plotter and gross errors.
 
 >>> from photostrip.simulation import Flight, Spec, simulate
 >>> simulation = simulate(Spec(flight=Flight(photos=5)))
@@ -11,7 +10,7 @@ gross errors, ``validation`` what cannot be simulated.
 ('A', ('1001', '1002', '1003', '1004', '1005'))
 """
 
-from photostrip.simulation.gross import InjectedError
+from photostrip.simulation.measuring import InjectedError
 from photostrip.simulation.simulation import Simulation, Truth, simulate
 from photostrip.simulation.spec import (
     DIGITAL,

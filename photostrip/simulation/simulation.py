@@ -15,16 +15,19 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, PointTable
-from photostrip.simulation.control import Roles, given_coordinates, roles
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.simulation.film import Sheets, sheets
-from photostrip.simulation.flight import Photos, bent, fly, project
-from photostrip.simulation.gross import InjectedError, spoil_control, spoil_images
-from photostrip.simulation.ground import World, surface, world
-from photostrip.simulation.placement import Placed, place, shown
-from photostrip.simulation.plotter import TruePlaces, plotted
-from photostrip.simulation.spec import Spec
-from photostrip.simulation.validation import LARGEST_ARC, faults_of
+from photostrip.simulation.flight import Photos, World, bent, fly, project, surface, world
+from photostrip.simulation.measuring import (
+    InjectedError,
+    Sheets,
+    TruePlaces,
+    plotted,
+    sheets,
+    spoil_control,
+    spoil_images,
+)
+from photostrip.simulation.placement import Placed, Roles, given_coordinates, place, roles, shown
+from photostrip.simulation.spec import LARGEST_ARC, Spec, faults_of
 from photostrip.strip.image_coordinates.corrections import distort
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors

@@ -2,6 +2,6 @@
 
 ``image_coordinates`` measured to ideal image coordinates; ``relative_orientation`` of each pair; ``strip_formation`` of
 its models; ``absolute_orientation`` on the control; ``polynomial`` correction of the deformation; ``resection`` of the
-photos. Beside them ``error_propagation``, ``gross_errors`` of pairs and of control, and ``independent_models``;
-``robust`` has the weights that several of them use.
+photos. Beside them ``strip_errors`` and, after the fit to the control, ``fitted_strip``; ``gross_errors`` of pairs and
+of control, ``independent_models``, ``ray_intersection``; ``robust`` has the weights that several of them use.
 """

@@ -19,7 +19,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geodesy.curvature import EARTH_RADIUS
+from photostrip.geodesy.local_frame import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, Spread, collinearity

@@ -19,7 +19,6 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import ANGLES, ImagePair, Motion, Turn, find_motion
-from photostrip.terrestrial.frame import small_turn
 from photostrip.terrestrial.normal_case import (
     SIDES,
     SPACE,
@@ -29,6 +28,7 @@ from photostrip.terrestrial.normal_case import (
     intersect,
     limit,
     meeting_z,
+    small_turn,
     statistic,
     to_normal,
 )

@@ -18,11 +18,11 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.geodesy.curvature import EARTH_RADIUS
+from photostrip.geodesy.local_frame import EARTH_RADIUS
 from photostrip.notes import counted, listed
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
-from photostrip.terrestrial import frame
+from photostrip.terrestrial import normal_case
 
 ANGLES = ("alpha", "omega", "kappa")
 INTERIOR = ("f", "x0", "z0")
@@ -91,7 +91,7 @@ class PhotoOrientation:
     @property
     def rotation(self) -> Floats:
         """Photo to ground, shape (3, 3)."""
-        return frame.ground_from_photo(*self.values[:3])
+        return normal_case.ground_from_photo(*self.values[:3])
 
     @property
     def sigma(self) -> Floats:
@@ -205,15 +205,15 @@ def _solve(
 
 def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
     """Angles from the rotation that brings the rays closest to the directions; level where that is not determined."""
-    ray = frame.rays(sightings.xz - interior[1:3], interior[0])
+    ray = normal_case.rays(sightings.xz - interior[1:3], interior[0])
     both = used & sightings.measured.all(axis=1)
     if both.sum() >= LEAST_POINTS:
         unit = ray[both] / np.linalg.norm(ray[both], axis=1, keepdims=True)
-        left, size, right = np.linalg.svd(frame.vectors_of(sightings.directions[both]).T @ unit)
+        left, size, right = np.linalg.svd(normal_case.vectors_of(sightings.directions[both]).T @ unit)
         if size[1] > 1e-9 * size[0]:  # two different directions
             sign = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
-            return frame.angles_of(left @ sign @ right)
-    across = frame.directions_of(ray @ frame.GROUND_FROM_HOUSE.T)[:, 0]
+            return normal_case.angles_of(left @ sign @ right)
+    across = normal_case.directions_of(ray @ normal_case.GROUND_FROM_HOUSE.T)[:, 0]
     turned = (sightings.directions[:, 0] - across)[used & sightings.measured[:, 0]]
     if not len(turned):
         return np.zeros(3)
@@ -237,16 +237,18 @@ def _from_the_axes(ray: Floats, distances: Floats, eccentricity: float) -> Float
 def _linearised(sightings: Sightings, values: Floats, active: Numbers, eccentricity: float) -> _System:
     """Directions of all points under the present orientation, and their derivatives."""
     alpha, omega, kappa, f = values[:4]
-    turn = frame.ground_from_photo(alpha, omega, kappa)
-    ray = frame.rays(sightings.xz - values[4:6], f)
+    turn = normal_case.ground_from_photo(alpha, omega, kappa)
+    ray = normal_case.rays(sightings.xz - values[4:6], f)
     if eccentricity:
         ray = _from_the_axes(ray, sightings.distances, eccentricity)
     ground = ray @ turn.T
-    gradient = frame.direction_gradient(ground)
+    gradient = normal_case.direction_gradient(ground)
     # the roll turns the ray about the photo's third axis, the elevation about the ground's x axis before the azimuth
-    about_vertical = frame.ground_from_photo(alpha) @ frame.GROUND_FROM_HOUSE.T  # adds alpha to every azimuth
+    about_vertical = (
+        normal_case.ground_from_photo(alpha) @ normal_case.GROUND_FROM_HOUSE.T
+    )  # adds alpha to every azimuth
     roll = np.cross([0.0, 0.0, 1.0], ray) @ turn.T
-    tilt = np.cross([1.0, 0.0, 0.0], ray @ frame.ground_from_photo(0.0, omega, kappa).T) @ about_vertical.T
+    tilt = np.cross([1.0, 0.0, 0.0], ray @ normal_case.ground_from_photo(0.0, omega, kappa).T) @ about_vertical.T
     by_photo = gradient @ turn
     design = np.empty((len(ray), 2, len(UNKNOWNS)))
     design[:, :, 0] = [1.0, 0.0]  # alpha is added to every azimuth
@@ -256,7 +258,7 @@ def _linearised(sightings: Sightings, values: Floats, active: Numbers, eccentric
     design[:, :, 4:6] = -by_photo[:, :, :2]
     risen = np.column_stack([np.zeros(len(ray)), np.nan_to_num(sightings.distances) / (2 * EARTH_RADIUS)])
     design[:, :, 6] = -risen
-    miss = sightings.directions - (frame.directions_of(ground) - values[6] * risen)
+    miss = sightings.directions - (normal_case.directions_of(ground) - values[6] * risen)
     miss[:, 0] = (miss[:, 0] + np.pi) % (2 * np.pi) - np.pi
     return _System(design[:, :, active], miss, _weights(sightings, by_photo[:, :, :2]))
 
@@ -317,7 +319,7 @@ def _result(
     hat = np.einsum("niu,uv,njv,njk->nik", system.design, cofactors, system.design, system.weight)
     redundancy = np.where(sightings.measured & used[:, None], 1.0 - hat[:, [0, 1], [0, 1]], np.nan)
     values = values.copy()
-    values[:3] = frame.angles_of(frame.ground_from_photo(*values[:3]))
+    values[:3] = normal_case.angles_of(normal_case.ground_from_photo(*values[:3]))
     return PhotoOrientation(
         names=names,
         values=values[active],

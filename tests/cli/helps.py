@@ -7,8 +7,7 @@ import io
 import os
 from unittest import mock
 
-from photostrip.cli.command_table import COMMANDS
-from photostrip.cli.main import main
+from photostrip.cli.main import COMMANDS, main
 from tests.source_tree import ROOT
 
 FOLDER = ROOT / "tests" / "data" / "help"

@@ -113,7 +113,7 @@ def test_a_method_that_does_not_take_the_project_is_told_with_its_reason(
 def test_where_the_bundle_does_not_converge_auto_takes_the_polynomial(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     code, _, err = run(capsys, PROJECT, *BUNDLE)
     assert code == 3
     (refused,) = (line for line in err.splitlines() if line.startswith("error: the bundle adjustment did not converge"))

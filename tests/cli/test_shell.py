@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.jobs.completion import keys
-from photostrip.cli.main import main
+from photostrip.cli.options import _keys
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-# --------------------------------------------------------------------------------------------------- completion
 
 
 def asked(photostrip: Path, shell: str, script: str) -> list[str]:
@@ -27,7 +24,7 @@ def asked(photostrip: Path, shell: str, script: str) -> list[str]:
 
 
 BASH = """
-eval "$(photostrip completion bash)"
+eval "$(_PHOTOSTRIP_COMPLETE=source_bash photostrip)"
 COMP_WORDS=(photostrip {words}); COMP_CWORD={count}; _photostrip_completion photostrip
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
@@ -38,12 +35,11 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ("co", {"compare", "completion", "convert"}),
+        ("co", {"compare", "convert"}),
         ("run --verb", {"--verbose"}),
         ("compare a b --format j", {"json", "junit"}),
         ("terrestrial dis", {"displacement"}),
         ("run --set processing.polynomial.d", {"processing.polynomial.degree="}),
-        ("completion f", {"fish"}),
         ("report r --section ch", {"check"}),
     ],
 )
@@ -53,34 +49,19 @@ def test_bash_completes(forked: Path, words: str, expected: set[str]) -> None:
 
 @pytest.mark.skipif(shutil.which("fish") is None, reason="needs fish")
 def test_fish_completes(forked: Path) -> None:
-    found = asked(forked, "fish", "photostrip completion fish | source; complete -C 'photostrip co'")
-    assert {"compare", "completion", "convert"} <= set(found)
+    found = asked(forked, "fish", "_PHOTOSTRIP_COMPLETE=source_fish photostrip | source; complete -C 'photostrip co'")
+    assert {"compare", "convert"} <= set(found)
 
 
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
 def test_zsh_reads_the_script(forked: Path) -> None:
-    script = 'autoload -U compinit; compinit -u -D; eval "$(photostrip completion zsh)"; echo $_comps[photostrip]'
+    script = 'autoload -U compinit; compinit -u -D; eval "$(_PHOTOSTRIP_COMPLETE=source_zsh photostrip)"'
+    script += "; echo $_comps[photostrip]"
     assert asked(forked, "zsh", script) == ["_photostrip_completion"]
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
-def test_every_shell_has_a_script(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", shell]) == 0
-    assert "PHOTOSTRIP_COMPLETE" in capsys.readouterr().out
-
-
-def test_another_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", "csh"]) == 2
-    assert "csh" in capsys.readouterr().err
-
-
 def test_the_keys_are_those_of_the_project_file() -> None:
-    found = keys("processing.relative.")
+    found = _keys("processing.relative.")
     assert {"processing.relative.screening=", "processing.relative.grubbs_alpha="} <= set(found)
-    assert {"output.crs=", "photos.camera="} <= set(keys(""))
-    assert keys("nothing") == []
-
-
-def test_completion_does_not_disturb_the_environment() -> None:
-    main(["completion", "bash"])
-    assert "_PHOTOSTRIP_COMPLETE" not in os.environ
+    assert {"output.crs=", "observations.unit="} <= set(_keys(""))
+    assert _keys("nothing") == []

@@ -107,3 +107,14 @@ def simulated(folder: Path, **changes: object) -> Model:
         xy = np.array([[float(each) for each in row[2:4]] for row in own])
         images.append((997 - 3 * number, quaternion, shift, 4, name_of(photo["id"]), xy, points))
     return Model({4: ("OPENCV", 5500, 3667, OPENCV)}, images)
+
+
+def small_model() -> Model:
+    """Give a small one: two cameras, four photos, twelve points."""
+    images = []
+    for number in range(4):
+        xy = np.random.default_rng(number).uniform(10.0, 990.0, (12, 2)).round(2)
+        pose = np.array([0.0, 1.0, 0.0, 0.01 * number]), np.array([-5.0 * number, 0.0, 50.0])
+        images.append((number + 1, *pose, 1 + number % 2, f"DJI {number}.JPG", xy, list(range(12))))
+    opencv = ("OPENCV", 1000, 1000, [900.0, 901.0, 500.0, 500.0, 0.01, 0.0, 0.0, 0.0])
+    return Model({1: ("SIMPLE_RADIAL", 1000, 1000, [900.0, 500.0, 500.0, 0.01]), 2: opencv}, images)

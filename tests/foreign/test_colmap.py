@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import struct
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import pytest
 import photostrip
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
-from tests.foreign.colmap_models import OPENCV, SCALE, SHIFT, SPEC, TO_MODEL, name_of, simulated
+from tests.foreign.colmap_models import OPENCV, name_of, simulated
 from tests.foreign.converting import convert, refused, with_control
 from tests.loops import nonempty
 
@@ -42,17 +41,6 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
     assert any("laid on the control: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
 
 
-def test_nothing_is_said_against_orientations_of_an_arbitrary_frame(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native")
-    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
-    project = with_control(tmp_path / "native", tmp_path / "block")
-    before, _, rest = project.read_text(encoding="utf-8").partition("control:")
-    project.write_text(f"{before}control:{rest.replace('[east, north, up]', '[north, east, up]')}", encoding="utf-8")
-    with pytest.raises(photostrip.InputError, match="fits the control only upside down") as refusal:
-        photostrip.run(project)
-    assert [each.code for each in refusal.value.findings if each.key.startswith("orientations")] == []
-
-
 def test_camera_positions_say_where_the_model_lies(tmp_path: Path) -> None:
     model = simulated(tmp_path / "native", gnss={"sigma": [0.03, 0.03, 0.05]})
     assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
@@ -69,41 +57,6 @@ def test_camera_positions_say_where_the_model_lies(tmp_path: Path) -> None:
         photo, *xyz = line.split(",")[:4]
         at = [found[name_of(photo)][name] for name in "xyz"]
         assert at == pytest.approx([float(each) for each in xyz], abs=0.3)
-
-
-def test_without_control_it_is_a_free_network_in_the_frame_of_the_model(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native")
-    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
-    found = photostrip.run(tmp_path / "block" / "project.yaml")
-    assert [each["code"] for each in found.document["notes"] if each["code"] == "free-network"]
-    truth = rows_of(photostrip.simulate(SPEC).truth["photos"])
-    expected = TO_MODEL.apply(SCALE * np.array([[each[name] for name in "xyz"] for each in truth])) + SHIFT
-    at = {each["id"]: [each[name] for name in "xyz"] for each in found.document["photos"]}
-    assert np.abs([at[name_of(each["id"])] for each in truth] - expected).max() < 0.02  # of a flight of 3.7 units
-
-
-def test_coordinates_in_the_frame_of_the_model_keep_a_thousandth_of_a_pixel(tmp_path: Path) -> None:
-    """A pixel there covers 0.001 units, four decimals would be a tenth of it."""
-    model = simulated(tmp_path / "native")
-    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
-    result = photostrip.run(tmp_path / "block" / "project.yaml")
-    result.write(tmp_path / "result")
-    rows = {
-        name: list(csv.DictReader((tmp_path / "result" / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
-        for name in ("points", "photos", "refined", "residuals")
-    }
-    points = {row["point"]: np.array([float(row[axis]) for axis in "xyz"]) for row in rows["points"]}
-    photos = {row["photo"]: row for row in rows["photos"]}
-    measured = {
-        (row["photo"], row["point"]): np.array([float(row[f"{axis}_mm"]) for axis in "xy"]) for row in rows["refined"]
-    }
-    f = result.document["cameras"][0]["principal_distance_mm"]
-    for row in nonempty(rows["residuals"]):
-        photo = photos[row["photo"]]
-        axes = np.array([[float(photo[f"r{i}{j}"]) for j in (1, 2, 3)] for i in (1, 2, 3)])
-        u, v, w = (points[row["point"]] - [float(photo[axis]) for axis in "xyz"]) @ axes
-        left = 1000 * (measured[row["photo"], row["point"]] + f * np.array([u, v]) / w)  # a pixel is a micrometre
-        assert left == pytest.approx([float(row["vx_um"]), float(row["vy_um"])], abs=0.008)  # given to 0.01 px
 
 
 def test_text_and_binary_are_the_same_project(tmp_path: Path) -> None:
@@ -163,48 +116,6 @@ def test_what_was_understood_is_printed(tmp_path: Path, capsys: pytest.CaptureFi
     assert captured.err.startswith("wrote observations.csv, orientations.csv, project.yaml to")
 
 
-def test_what_determines_nothing_is_left_out_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    model = simulated(tmp_path / "native")
-    _, quaternion, shift, camera, name, xy, points = model.images[0]
-    points[1] = points[0]  # twice on this photo
-    points[2] = -1  # a keypoint without a point
-    points[3] = 10**12  # on one photo only
-    model.images += [(1000, quaternion, shift, camera, 'empty, "quoted".jpg', xy[:0], [])]
-    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block") == 0
-    assert (
-        "1 point of a photo that stand on it twice: nothing says which is right; 1 point on one photo only; "
-        '1 photo without points: empty, "quoted".jpg'
-    ) in capsys.readouterr().out
-    rows = (tmp_path / "block" / "observations.csv").read_text(encoding="utf-8").splitlines()
-    assert sum(row.startswith(name + ",") for row in rows) == len(points) - 4
-    assert check_project(tmp_path / "block" / "project.yaml").faults == ()
-
-
-def test_names_of_any_kind_are_ids(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native")
-    names = [
-        "0123",
-        "a,b",
-        'say "x".jpg',
-        "NO",
-        "1:20",
-        "# no comment",
-        "x" * 300,
-        "Фото",
-        "日本/1 2.tif",
-        "-1",
-        "~",
-        "a'b",
-    ]
-    model.images = [(*each[:4], name, *each[5:]) for each, name in zip(model.images, names, strict=True)]
-    for kind in KINDS:
-        assert convert(model.write(tmp_path / kind, kind), tmp_path / kind / "block", "-q") == 0
-        checked = check_project(tmp_path / kind / "block" / "project.yaml")
-        assert (checked.faults, checked.notes) == ((), ())
-    found = photostrip.run(tmp_path / "text" / "block" / "project.yaml")
-    assert sorted(each["id"] for each in found.document["photos"]) == sorted(names)
-
-
 # ----------------------------------------------------------------------------------------------------- refusals
 
 
@@ -224,14 +135,6 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: pytest.Cap
     assert (tmp_path / "native" / "project.yaml").read_bytes() == before
     assert convert(source, tmp_path / "native", "--force", "-q") == 0
     assert (tmp_path / "native" / "project.yaml").read_bytes() != before
-
-
-def test_a_folder_that_is_no_model_names_one_inside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    simulated(tmp_path / "native").write_text(tmp_path / "colmap" / "sparse" / "0")
-    told = refused(capsys, tmp_path / "colmap", tmp_path / "block")
-    assert "is nothing that is read here; expected a folder with cameras.bin or cameras.txt (COLMAP)" in told
-    assert f"did you mean `{tmp_path / 'colmap' / 'sparse' / '0'}`?" in told
-    assert "is nothing that is read here" in refused(capsys, tmp_path / "nowhere", tmp_path / "block")
 
 
 IMAGE = "1 1 0 0 0 0 0 9 1 a.jpg"
@@ -292,40 +195,8 @@ def test_faults_of_a_binary_model_have_their_record(
     assert f"images.bin: {told}" in refused(capsys, tmp_path / "model", tmp_path / "block")
 
 
-def test_a_binary_model_that_is_called_a_text_is_no_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = simulated(tmp_path / "native").write_binary(tmp_path / "model")
-    for path in list(folder.iterdir()):
-        path.rename(path.with_suffix(".txt"))
-    assert "cameras.txt: is not text: it has NUL bytes" in refused(capsys, folder, tmp_path / "block")
-
-
 def test_unknown_models_of_a_binary_file_are_refused_by_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = replace(simulated(tmp_path / "native"), cameras={4: ("FOV", 9, 9, OPENCV[:5])}).write_binary(tmp_path)
     assert "cameras.bin: camera 1 of 1: the model FOV has no counterpart" in refused(capsys, folder, tmp_path / "block")
-
-
-def test_texts_of_other_systems_are_the_same(tmp_path: Path) -> None:
-    folder = simulated(tmp_path / "native").write_text(tmp_path / "model")
-    assert convert(folder, tmp_path / "one", "-q") == 0
-    for path in folder.iterdir():
-        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b" \r\n"))
-    assert convert(folder, tmp_path / "other", "-q") == 0
-    for name in ("observations.csv", "orientations.csv"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
-
-
-def test_a_camera_for_each_photo(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native")
-    model.cameras = dict.fromkeys(range(7, 7 + len(model.images)), ("OPENCV", 5500, 3667, OPENCV))
-    model.images = [(*each[:3], 7 + number, *each[4:]) for number, each in enumerate(model.images)]
-    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
-    found = photostrip.run(with_control(tmp_path / "native", tmp_path / "block"))
-    assert found.document["verdict"]["look_at"] == []
-    assert len(found.document["photos"]) == len(model.images)
-
-
-def test_a_file_of_a_model_names_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = simulated(tmp_path / "native").write_binary(tmp_path / "model")
-    assert f"did you mean `{folder}`?" in refused(capsys, folder / "images.bin", tmp_path / "block")

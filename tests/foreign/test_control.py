@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import re
-from random import Random
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -15,8 +12,6 @@ import photostrip
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
 from tests.foreign.colmap_models import simulated
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
-from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -113,13 +108,6 @@ def test_a_list_of_opendronemap_gives_the_result_of_the_native_project(
     agree(places(found), places(known), [name for name in block.control if name.startswith("G")])
 
 
-def test_a_table_with_marks_gives_the_same(tmp_path: Path) -> None:
-    block = Block(tmp_path)
-    known = block.without_checks()
-    assert block.convert(block.table(), *UTM, *SIGMA, "--force") == 0
-    agree(places(block.run()), places(known), [name for name in block.control if name.startswith("G")])
-
-
 def test_longitudes_with_their_own_precision(tmp_path: Path) -> None:
     import pyproj
 
@@ -137,15 +125,6 @@ def test_longitudes_with_their_own_precision(tmp_path: Path) -> None:
     agree(places(block.run()), places(known), [name for name in block.control if name.startswith("G")])
 
 
-def test_rows_without_names_are_points_by_their_place(tmp_path: Path) -> None:
-    block = Block(tmp_path)
-    known = places(block.without_checks())
-    assert block.convert(block.odm("EPSG:32633", named=False), *SIGMA, "--force") == 0
-    found = places(block.run())
-    for number, name in enumerate(nonempty(dict.fromkeys(row["point"] for row in block.marks)), 1):
-        assert found[f"gcp-{number}"] == pytest.approx(known[name], abs=2e-4)
-
-
 @pytest.mark.parametrize("unknown", ["0", "NaN"])
 def test_heights_of_opendronemap_that_are_not_known(tmp_path: Path, unknown: str) -> None:
     block = Block(tmp_path)
@@ -156,27 +135,6 @@ def test_heights_of_opendronemap_that_are_not_known(tmp_path: Path, unknown: str
         "G02,,xy,control,0.01,0.01,0.015"
     ]
     assert block.run()["verdict"]["look_at"] == []
-
-
-def test_wrong_control_is_named_although_the_start_lies_on_it(tmp_path: Path) -> None:
-    block = Block(tmp_path)
-    five = ["G01", "G02", "G03", "G04", "G05"]
-    block.marks = [row for row in block.marks if row["point"] in five or row["point"].startswith("K")]
-    assert block.convert(block.odm(), *SIGMA) == 0
-    sound = places(block.run())
-    one, other = block.control["G01"], block.control["G04"]
-    block.control |= {"G01": other, "G04": one}
-    assert block.convert(block.odm(), *SIGMA, "--force") == 0
-    exchanged = block.run()
-    assert "P408 given points G01 and G04 fit when their coordinates are exchanged" in told(exchanged)
-    block.control |= {"G01": {**one, "y": str(float(one["y"]) + 1000.0)}, "G04": other}
-    assert block.convert(block.odm(), *SIGMA, "--force") == 0
-    far = block.run()
-    assert "G01" in told(far)
-    assert "+1000" in told(far)
-    for result in (exchanged, far):
-        at = places(result)
-        assert all(at[name] == pytest.approx(sound[name], abs=0.2) for name in at if name.startswith("CHK-"))
 
 
 def told(document: dict[str, Any]) -> str:
@@ -193,30 +151,6 @@ def test_marks_of_photos_of_another_width(tmp_path: Path, capsys: pytest.Capture
     assert re.search(r"gcp_list\.txt:\d+:\d+: ", told)
     assert block.convert(block.odm(), *SIGMA, "--mark-width", "11000") == 0
     agree(places(block.run()), places(block.native()), [name for name in block.control if name.startswith("G")])
-
-
-def test_a_precision_of_marks_of_their_own(tmp_path: Path) -> None:
-    block = Block(tmp_path)
-    assert block.convert(block.odm(), *SIGMA, "--mark-sigma", "1.5") == 0
-    rows = (tmp_path / "block" / "observations.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0] == "photo,point,x,y,sx,sy"
-    assert all(row.endswith(",,") for row in nonempty(row for row in rows[1:] if ",colmap-" in row))
-    assert sum(row.endswith(",1.5,1.5") for row in rows) == len(block.marks)
-    assert block.run()["verdict"]["look_at"] == []
-
-
-def test_marks_on_other_photos_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    block = Block(tmp_path)
-    lost = [row for row in block.marks if row["photo"] == "1001"]
-    for row in lost:
-        row["photo"] = "elsewhere"
-    assert block.convert(block.odm(), *SIGMA) == 0
-    assert f"{len(lost)} marks on photos that the block does not have: elsewhere.JPG" in capsys.readouterr().out
-    for row in block.marks:
-        row["photo"] = "elsewhere"
-    (tmp_path / "block" / "project.yaml").unlink()
-    assert block.convert(block.odm(), *SIGMA, "--force") == 2
-    assert "none of its photos is in the block: elsewhere.JPG; the block has flight/1001.JPG" in capsys.readouterr().err
 
 
 def test_what_the_table_does_not_say_is_asked_for_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -244,25 +178,3 @@ def test_contradictions_have_their_line(tmp_path: Path, capsys: pytest.CaptureFi
     told = block.refused(capsys, path, *SIGMA)
     assert f"gcp_list.txt:{len(lines)}" in told
     assert "has other coordinates than in line" in told
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["csv", "txt"])
-def test_a_damaged_table_is_refused_or_written_whole(tmp_path: Path, kind: str) -> None:
-    block, random = Block(tmp_path), Random(kind)
-    block.marks = block.marks[:20]
-    path = block.table() if kind == "csv" else block.odm()
-    whole, written = path.read_bytes(), 0
-    for number in nonempty(range(DAMAGED)):
-        path.write_bytes(damaged(whole, random, WORDS))
-        target, said = tmp_path / f"block-{number}", io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(tmp_path / "model"), "-o", str(target), "--sigma", "0.5",
-                         "--control", str(path), *UTM, *SIGMA])  # fmt: skip
-        assert code in {0, 2}, (said.getvalue(), path.read_bytes())
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert f"{path.name}:" in said.getvalue()
-        elif (written := written + 1) % 10 == 0:
-            assert check_project(target / "project.yaml").faults == (), path.read_bytes()
-    assert written > 0.04 * DAMAGED

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import json
-import re
-from random import Random
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +11,10 @@ import pytest
 from pyproj import Transformer
 
 import photostrip
-from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
-from tests.foreign.colmap_models import name_of, simulated
+from tests.foreign.colmap_models import name_of, simulated, small_model
 from tests.foreign.converting import convert, refused
 from tests.foreign.opensfm_models import ground_control
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged, model
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -88,21 +82,6 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
         assert at[point]["sigma_z"] == pytest.approx(expected[point]["sigma_z"], abs=3e-4)
 
 
-def test_it_says_which_event_each_photo_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = model().write_text(tmp_path / "model")  # photos DJI 0.JPG to DJI 3.JPG
-    events = tmp_path / "Timestamp.MRK"
-    events.write_text("\n".join(mrk(n, place) for n, place in enumerate(small(6))), encoding="utf-8")
-    assert convert(source, tmp_path / "numbered", "--positions", str(events)) == 0
-    said = capsys.readouterr().out
-    assert "4 events of DJI, by the number in the photo's name: DJI 0.JPG is line 1; WGS 84" in said
-    assert "2 of them without fixed ambiguities" in said
-    rows = (tmp_path / "numbered" / "positions.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[:2] == ["photo,x,y,z,sx,sy,sz", "DJI 0.JPG,16.475,47.643,512.9,0.02,0.03,0.05"]
-    events.write_text("\n".join(mrk(n + 8, place) for n, place in enumerate(small())), encoding="utf-8")
-    assert convert(source, tmp_path / "ordered", "--positions", str(events)) == 0
-    assert "in the order of the photos' names: DJI 0.JPG is line 1" in capsys.readouterr().out
-
-
 # ---------------------------------------------------------------------------------------------------- refusals
 
 WRONG: dict[str, tuple[list[str], str]] = {
@@ -127,30 +106,8 @@ WRONG: dict[str, tuple[list[str], str]] = {
 def test_wrong_events_are_refused_with_their_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
-    source = model().write_text(tmp_path / "model")
+    source = small_model().write_text(tmp_path / "model")
     lines, expected = WRONG[name]
     (tmp_path / "events.pos").write_text("\n".join(lines), encoding="utf-8")
     told = refused(capsys, source, tmp_path / "block", "--positions", str(tmp_path / "events.pos"))
     assert f"events.pos{expected}" in told
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["mrk", "pos"])
-def test_damaged_events_are_refused_or_written_whole(tmp_path: Path, kind: str) -> None:
-    random, written = Random(kind), 0
-    source = model().write_text(tmp_path / "model")
-    lines = [mrk(n, each) if kind == "mrk" else pos(n, each) for n, each in enumerate(small())]
-    whole = "\n".join(lines if kind == "mrk" else [HEAD, *lines]).encode()
-    events = tmp_path / "events.pos"
-    for number in nonempty(range(DAMAGED)):
-        events.write_bytes(damaged(whole, random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(source), "-o", str(target), "--sigma", "0.5", "--positions", str(events)])
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(r"events\.pos(:\d+)*: ", said.getvalue()), said.getvalue()
-        elif (written := written + 1) % 10 == 0:
-            assert check_project(target / "project.yaml").faults == (), events.read_bytes()
-    assert 0.05 * DAMAGED < written < 0.9 * DAMAGED

@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import sqlite3
-from contextlib import closing
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import photostrip
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import read_result
-from tests.foreign.colmap_models import SPEC, simulated
+from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
 from tests.results import rotation
 
@@ -206,31 +204,6 @@ def test_footprints_are_the_corners_of_the_photos_on_the_ground(block: Ran, tmp_
         )  # scale of the map
 
 
-def test_differences_and_ellipses_are_drawn_as_much_larger_as_their_layers_say(block: Ran, tmp_path: Path) -> None:
-    file, document = tmp_path / "block.gpkg", block.document
-    assert main(["convert", str(block), str(file), "-q"]) == 0
-    rows, geometry, meta = layer(file, "error_vectors")
-    factor = number_in(meta["layer_metadata"]["DESCRIPTION"], r"([\d.e+]+) times")
-    control = {each["id"]: each for each in document["control"]}
-    assert factor > 1
-    for row, each in nonempty(list(zip(rows, geometry, strict=True))):
-        start, end = places(each)
-        expected = east_first(document, [control[row["id"]]], "dx dy dz")[0, :2]
-        assert (end - start)[:2] / factor == pytest.approx(expected, abs=2e-5)
-    rows, geometry, meta = layer(file, "error_ellipses")
-    factor = number_in(meta["layer_metadata"]["DESCRIPTION"], r"([\d.e+]+) times")
-    at = east_first(document, document["points"])
-    for row, each, point in nonempty(list(zip(rows, geometry, at, strict=True))):
-        away = (places(each) - point)[:, :2] / factor
-        farthest = away[np.argmax(np.linalg.norm(away, axis=1))]
-        assert np.linalg.norm(away, axis=1).max() == pytest.approx(row["ellipse_a"], rel=2e-3)
-        assert np.linalg.norm(away, axis=1).min() == pytest.approx(row["ellipse_b"], rel=2e-3)
-        azimuth = np.degrees(np.arctan2(*farthest)) % 180
-        assert row["ellipse_a"] < 1.02 * row["ellipse_b"] or (
-            azimuth - row["ellipse_azimuth_deg"] + 90
-        ) % 180 - 90 == pytest.approx(0, abs=5)
-
-
 @pytest.mark.parametrize(
     ("output", "crs"),
     [
@@ -249,16 +222,6 @@ def test_other_frames_lie_where_they_are(output: list[str], crs: str, tmp_path: 
     assert crs in {meta["crs"], known.to_json_dict().get("conversion", {}).get("method", {}).get("name")}
     lonlat = Transformer.from_crs(known, known.geodetic_crs, always_xy=True).transform(*place)
     assert lonlat == pytest.approx((13.5, 49.2), abs=0.01)
-
-
-def test_a_geopackage_is_one_by_the_standard(block: Ran, tmp_path: Path) -> None:
-    assert main(["convert", str(block), str(tmp_path / "a.gpkg"), "-q"]) == 0
-    with closing(sqlite3.connect(tmp_path / "a.gpkg")) as base:
-        assert base.execute("PRAGMA application_id").fetchone() == (0x47504B47,)
-        assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-        assert base.execute("PRAGMA foreign_key_check").fetchall() == []
-        known = {row[0] for row in base.execute("SELECT srs_id FROM gpkg_spatial_ref_sys")}
-        assert {-1, 0, 4326} <= known
 
 
 # -------------------------------------------------------------------------------------------------- orthority
@@ -313,47 +276,6 @@ def test_orthority_has_every_orientation_and_the_departure_of_its_map_is_told(
         told = number_in(said, r"by up to ([\d.]+) px")
         assert told == pytest.approx(max(away), abs=0.01)
         assert CRS.from_wkt((tmp_path / "ori.prj").read_text(encoding="utf-8")) == CRS(UTM)
-
-
-def test_geojson_of_orthority_says_the_same_as_its_table(
-    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if block.document["frame"]["crs"] == "local":
-        assert "has none; write CSV (.csv)" in refused(capsys, str(block), str(tmp_path / "ori.geojson"))
-        return
-    for name in ("ori.csv", "ori.geojson"):
-        assert main(["convert", str(block), str(tmp_path / name), "-q"]) == 0
-    found = json.loads((tmp_path / "ori.geojson").read_text(encoding="utf-8"))
-    assert CRS.from_wkt(found["world_crs"]) == CRS(UTM)
-    to_map = Transformer.from_crs("EPSG:4326", UTM, always_xy=True)
-    for row, each in nonempty(list(zip(table(tmp_path / "ori.csv"), found["features"], strict=True))):
-        known = each["properties"]
-        assert (row["filename"], row["camera"]) == (known["filename"], known["camera"])
-        assert [float(row[name]) for name in "xyz"] == known["xyz"]
-        assert np.radians([float(row[name]) for name in ("omega", "phi", "kappa")]) == pytest.approx(known["opk"])
-        lon, lat, height = each["geometry"]["coordinates"]
-        assert (*to_map.transform(lon, lat), height) == pytest.approx(known["xyz"], abs=1e-3)
-    rows, _, meta = (pyogrio.raw.read(tmp_path / "ori.geojson")[place] for place in (3, 2, 0))
-    assert len(rows[0]) == len(block.document["photos"])
-    assert meta["crs"] == "EPSG:4979"
-
-
-def test_the_table_with_tabs_says_the_same_as_that_of_orthority(
-    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    said = []
-    for name in ("ori.csv", "table.txt"):
-        capsys.readouterr()
-        assert main(["convert", str(block), str(tmp_path / name)]) == 0
-        said.append(re.findall(r"by up to .* px", capsys.readouterr().out))
-    assert said[0] == said[1]
-    names, *rows = (line.split("\t") for line in (tmp_path / "table.txt").read_text(encoding="utf-8").splitlines())
-    assert names == ["label", "X", "Y", "Z", "omega", "phi", "kappa"]
-    assert rows == [list(row.values())[:7] for row in nonempty(table(tmp_path / "ori.csv"))]
-    assert not list(tmp_path.glob("table_*"))
-    local = block.document["frame"]["crs"] == "local"
-    assert (tmp_path / "table.prj").exists() != local
-    assert local or CRS.from_wkt((tmp_path / "table.prj").read_text(encoding="utf-8")) == CRS(UTM)
 
 
 # ----------------------------------------------------------------------------------------------------- COLMAP
@@ -423,20 +345,6 @@ def test_a_distortion_that_colmap_does_not_know_is_fitted_and_its_departure_told
     assert off_the_measured(found, tmp_path / "model") < told + 0.01
 
 
-def test_a_calibration_that_was_found_is_in_the_cameras(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked = "processing.self_calibration=[principal_distance,principal_point,k1]"
-    photostrip.simulate(SPEC).write(tmp_path / "project")
-    project = tmp_path / "project" / "project.yaml"
-    text = project.read_text(encoding="utf-8").replace("principal_distance: 8.8", "principal_distance: 8.83")
-    project.write_text(text.replace("-0.0002", "-0.00015"), encoding="utf-8")
-    out = tmp_path / "run"
-    assert main(["run", str(project), "-o", str(out), "-q", "--set", asked]) == 0
-    assert main(["convert", str(out), f"{tmp_path / 'model'}/"]) == 0
-    told = number_in(capsys.readouterr().out, r"within ([\d.]+) px")
-    found = Ran(out, read_result(str(out / "result.json")))
-    assert off_the_measured(found, tmp_path / "model") < told + 0.01
-
-
 def test_cameras_go_into_a_project_again_with_their_calibration(tmp_path: Path) -> None:
     photostrip.simulate(SPEC).write(tmp_path)
     project = tmp_path / "project.yaml"
@@ -469,30 +377,6 @@ def off_the_measured(found: Ran, model: Path) -> float:
         away = [ray.xy - measured[each.name, names[ray.point3D_id]] for ray in rays]
         largest = max(largest, float(np.linalg.norm(away, axis=1).max()))
     return largest
-
-
-def test_a_model_that_came_from_colmap_goes_back_with_its_names_and_numbers(tmp_path: Path) -> None:
-    given = simulated(tmp_path / "native")
-    given.cameras[7] = given.cameras[4]  # two cameras of the same kind
-    given.images = [each if number % 2 else (*each[:3], 7, *each[4:]) for number, each in enumerate(given.images)]
-    given.images = [(*each[:4], each[4].replace(" ", "_"), *each[5:]) for each in given.images]
-    given.write_text(tmp_path / "model")
-    block = tmp_path / "block"
-    assert main(["convert", str(tmp_path / "model"), "-o", str(block), "--sigma", "0.5", "-q"]) == 0
-    assert main(["run", str(block / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
-    assert main(["convert", str(tmp_path / "run"), f"{tmp_path / 'back'}/", "-q"]) == 0
-    after = {each.name: each for each in pycolmap.Reconstruction(tmp_path / "back").images.values()}
-    assert set(after) == {each[4] for each in given.images}
-    cameras: dict[int, set[int]] = {4: set(), 7: set()}
-    for _, _, _, camera, name, xy, points in nonempty(given.images):
-        cameras[camera].add(after[name].camera_id)
-        known = dict(zip(points, xy.tolist(), strict=True))
-        rays = {ray.point3D_id: ray.xy for ray in after[name].points2D if ray.has_point3D()}
-        assert len(rays) > 0.9 * len(known)
-        for point, place in rays.items():
-            assert place == pytest.approx(known[point], abs=0.2)  # a unit is 27 m, written to 0.1 mm
-    assert [len(each) for each in cameras.values()] == [1, 1]
-    assert cameras[4] != cameras[7]
 
 
 # ----------------------------------------------------------------------------------------------------- OpenSfM
@@ -537,34 +421,6 @@ def test_opensfm_projects_the_points_of_a_reconstruction_onto_the_adjusted_image
     assert np.array([each["coordinates"] for each in found["points"].values()]) == pytest.approx(xyz, abs=1e-4)
 
 
-def test_a_reconstruction_is_read_again_with_its_rays_and_poses(block: Ran, tmp_path: Path) -> None:
-    (tmp_path / "sfm").mkdir()
-    assert main(["convert", str(block), str(tmp_path / "sfm" / "reconstruction.json"), "-q"]) == 0
-    assert main(["convert", str(tmp_path / "sfm"), "-o", str(tmp_path / "again"), "--sigma", "0.5", "-q"]) == 0
-    again = measured_image_points(tmp_path, "again")
-    measured = measured_image_points(block.folder.parent)
-    assert len(again) == block.document["counts"]["image_points_used"]
-    for (photo, point), place in nonempty(again.items()):
-        assert place == pytest.approx(measured[photo, point.removeprefix("opensfm-")], abs=0.01)
-    assert main(["run", str(tmp_path / "again" / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
-    assert main(["convert", str(tmp_path / "run"), str(tmp_path / "reconstruction.json"), "-q"]) == 0
-    (before,) = json.loads((tmp_path / "sfm" / "reconstruction.json").read_text(encoding="utf-8"))
-    (after,) = json.loads((tmp_path / "reconstruction.json").read_text(encoding="utf-8"))
-    assert set(after["points"]) == set(before["points"])
-
-
-def test_a_reconstruction_overwrites_no_measurements(
-    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    target = tmp_path / "reconstruction.json"
-    (tmp_path / "tracks.csv").write_text("measured", encoding="utf-8")
-    assert "tracks.csv: already exists and is not overwritten" in refused(capsys, str(block), str(target))
-    assert (tmp_path / "tracks.csv").read_text(encoding="utf-8") == "measured"
-    assert not target.exists()
-    assert "write FOLDER/reconstruction.json" in refused(capsys, str(block), f"{tmp_path}/a.json", "--to", "opensfm")
-    assert main(["convert", str(block), str(target), "-q", "--force"]) == 0
-
-
 # ------------------------------------------------------------------------------------------ both ways, refusals
 
 
@@ -587,15 +443,6 @@ def test_a_run_writes_what_its_project_asks_for_and_a_saved_result_gives_the_sam
     assert {name: (tmp_path / "again" / name).read_bytes() for name in written} == written
     resolved = (found.folder / "project.resolved.yaml").read_text(encoding="utf-8")
     assert "model/" in resolved
-
-
-def test_a_batch_writes_the_same_files(tmp_path: Path) -> None:
-    asked = "export=[a.gpkg,model/]"
-    found = ran(tmp_path, "--set", asked)
-    project = tmp_path / "project" / "project.yaml"
-    assert main(["batch", str(project), "-o", str(tmp_path / "batch"), "-j", "1", "-q", "--set", asked]) == 0
-    for name in ("a.gpkg", "model/cameras.txt", "model/images.txt", "model/points3D.txt", "result.json"):
-        assert (tmp_path / "batch" / "project" / name).read_bytes() == (found.folder / name).read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -638,21 +485,6 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_written(
     assert len(table(tmp_path / "table.txt")) == len(block.document["photos"])
 
 
-def test_an_edited_result_says_so(block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "result.json"
-    text = (block.folder / "result.json").read_text(encoding="utf-8")
-    document = json.loads(text)
-    document["points"]["z"][0] += 5
-    file.write_text(json.dumps(document), encoding="utf-8")
-    capsys.readouterr()
-    assert main(["convert", str(file), str(tmp_path / "a.gpkg")]) == 0
-    assert "it was edited after it was written" in capsys.readouterr().out
-    document["frame"]["axes"] = ["east", "north", "east"]
-    file.write_text(json.dumps(document), encoding="utf-8")
-    assert f"{file}: cannot be exported: its numbers" in refused(capsys, str(file), str(tmp_path / "b.gpkg"))
-    assert not (tmp_path / "b.gpkg").exists()
-
-
 def test_independent_models_have_points_but_no_orientations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     photostrip.simulate({"models": {}, "control": {"layout": "bands", "bands": 3}}).write(tmp_path / "project")
     assert main(["run", str(tmp_path / "project" / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
@@ -665,19 +497,3 @@ def test_independent_models_have_points_but_no_orientations(tmp_path: Path, caps
     assert "no orientation of photos, which a/ is made of" in capsys.readouterr().out
     for name in ("a.csv", "a/"):
         assert "no orientation of photos" in refused(capsys, str(tmp_path / "run"), f"{tmp_path}/{name}")
-
-
-def test_orthority_takes_maps_only_and_colmap_one_place_for_each_point(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    found = ran(tmp_path / "a", "--set", "output.crs=geocentric", ground=GROUNDS["map"])
-    said = refused(capsys, str(found), str(tmp_path / "a.csv"))
-    assert "these are geocentric; give output.crs of a map projection" in said
-    feet = ["output.crs=EPSG:2225", "output.axes=[east,north,up]"]
-    found = ran(tmp_path / "c", *(word for each in feet for word in ("--set", each)),
-                ground={"crs": "EPSG:6339", "center_deg": [-122.0, 40.5]})  # fmt: skip
-    assert "heights in metres stand beside a plan in US survey feet" in refused(capsys, str(found), f"{tmp_path}/a.csv")
-    assert "HISTORIX counts in metres" in refused(capsys, str(found), f"{tmp_path}/extrinsics.csv")
-    found = ran(tmp_path / "b", "--set", "processing.adjustment=polynomial", flight={"photos": 6, "strips": 2},
-                control={"layout": "bands", "bands": 3, "check": 4})  # fmt: skip
-    assert "processing.adjustment=bundle" in refused(capsys, str(found), f"{tmp_path}/m/")

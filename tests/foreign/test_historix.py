@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import re
-from random import Random
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +11,6 @@ from photostrip.cli.main import main
 from photostrip.formats.output.result_json import read_result
 from tests.foreign.converting import convert, refused
 from tests.foreign.historix_blocks import FILES, OPTIONS, copied, plane, simulated, with_ties
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
-from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,21 +52,6 @@ def test_the_camera_keeps_its_numbers_and_its_marks(tmp_path: Path, capsys: pyte
     assert rows[1] == "ARBCSRD00010006.tif,cg01,4703.34,2196.9"
 
 
-def test_marks_may_be_missing(tmp_path: Path) -> None:
-    source = copied(tmp_path / "historix")
-    file = source / FILES[0]
-    head, row = file.read_text(encoding="utf-8").splitlines()
-    cells = [cell if place not in range(2, 10) else "" for place, cell in enumerate(row.split(","))]
-    file.write_text(f"{head}\n{','.join(cells)}\n", encoding="utf-8")
-    assert convert(source, tmp_path / "corners", *OPTIONS, "-q") == 0
-    assert (tmp_path / "corners" / "project.yaml").read_text(encoding="utf-8").count("midside_") == 0
-    file.write_text(
-        "focal_length,pixel_pitch,principal_point_x_mm,principal_point_y_mm\n152.865,0.025,0,0\n", encoding="utf-8"
-    )
-    assert convert(source, tmp_path / "none", *OPTIONS, "-q") == 0
-    assert "fiducials" not in (tmp_path / "none" / "project.yaml").read_text(encoding="utf-8")
-
-
 # ---------------------------------------------------------------------------------------------------- refusals
 
 
@@ -90,14 +69,6 @@ def test_what_the_files_do_not_carry_is_asked_for(
     place = OPTIONS.index(missing)
     options = OPTIONS[:place] + OPTIONS[place + 2 :]
     assert expected in refused(capsys, copied(tmp_path / "historix"), tmp_path / "block", *options)
-
-
-def test_without_control_nothing_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = copied(tmp_path / "historix")
-    (source / "gcp.csv").rename(tmp_path / "marks.csv")
-    told = refused(capsys, source, tmp_path / "block", *OPTIONS[:4])
-    assert "nothing is measured on these photos; give --control FILE" in told
-    assert convert(source, tmp_path / "block", *OPTIONS, "--control", str(tmp_path / "marks.csv"), "-q") == 0
 
 
 WRONG: dict[str, tuple[str, str, str, str]] = {
@@ -149,46 +120,3 @@ def test_a_distortion_has_no_unit_there(tmp_path: Path, capsys: pytest.CaptureFi
     assert "nothing says in which unit k1 is" in refused(capsys, source, tmp_path / "block", *OPTIONS)
     (source / FILES[0]).write_text(f"{head}\n{row}\n{row}\n", encoding="utf-8")
     assert "2 cameras, and nothing says which photo has which" in refused(capsys, source, tmp_path / "block", *OPTIONS)
-
-
-def test_options_are_for_what_asks_for_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = copied(tmp_path / "historix")
-    told = refused(capsys, source, tmp_path / "block", *OPTIONS, "--pixel-size", "0.02")
-    assert f"{FILES[0]}: --pixel-size: says how large a pixel is, by its pixel_pitch; leave it out" in told
-    told = refused(capsys, source, tmp_path / "block", "--image-size", "10000", *OPTIONS[2:])
-    assert "--image-size: `10000` is no size; expected width and height in pixels" in told
-    told = refused(capsys, source, tmp_path / "block", *OPTIONS[:2], "--positions-sigma", "1,2", *OPTIONS[4:])
-    assert "--positions-sigma: `1,2` is no precision" in told
-    model = tmp_path / "model"
-    model.mkdir()
-    (model / "cameras.txt").touch()
-    assert "--image-size: is of no use here" in refused(capsys, model, tmp_path / "block", *OPTIONS[:2])
-
-
-# ----------------------------------------------------------------------------------------------------- damage
-
-
-@pytest.mark.slow
-def test_a_damaged_project_is_refused_or_written_whole(tmp_path: Path) -> None:
-    random, written = Random("historix"), 0
-    folder = copied(tmp_path / "historix")
-    whole = {name: (folder / name).read_bytes() for name in FILES}
-    for number in nonempty(range(DAMAGED)):
-        for name, data in whole.items():
-            (folder / name).write_bytes(data)
-        name = random.choice(list(whole))
-        (folder / name).write_bytes(damaged(whole[name], random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = convert(folder, target, *OPTIONS)
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(rf"({'|'.join(FILES)})(:\d+)*: ", said.getvalue()), said.getvalue()
-        elif (written := written + 1) % 3 == 0:
-            with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-                main(["check", str(target / "project.yaml")])
-                faults = [line for line in said.getvalue().splitlines() if line.startswith("error: ")]
-                allowed = "expected at least 4, better 12", "photo-not-tied", "camera_positions"  # no tie points yet
-                assert [line for line in faults if not any(each in line for each in allowed)] == []
-    assert 0.02 * DAMAGED < written < 0.9 * DAMAGED

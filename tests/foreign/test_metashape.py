@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import re
-from random import Random
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,15 +12,13 @@ import yaml
 from pyproj import Transformer
 
 import photostrip
-from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
 from photostrip.project.checks.check import check_project
 from photostrip.result.table import rows_of
 from tests.foreign import colmap_models
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
-from tests.foreign.metashape_models import LOCAL, SCALE, UTM, cameras, document, label_of, markers, simulated
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
+from tests.foreign.metashape_models import SCALE, UTM, cameras, document, label_of, markers, simulated
 from tests.loops import nonempty
 from tests.results import rotation
 
@@ -51,12 +46,6 @@ def on_earth(truth: Document) -> tuple[Floats, Floats]:
         along = geocentric(ground + step) - geocentric(ground - step)
         axes.append(along / np.linalg.norm(along, axis=1, keepdims=True))
     return np.stack(axes, axis=2), geocentric(ground)
-
-
-def level(truth: Document) -> tuple[Floats, Floats]:
-    """Give the same of a simulation in a local frame."""
-    ground = np.array([[photo[axis] for axis in "xyz"] for photo in rows_of(truth["photos"])])
-    return np.tile(np.eye(3), (len(ground), 1, 1)), ground
 
 
 @pytest.fixture
@@ -125,21 +114,6 @@ def test_orientations_are_those_of_the_chunk_on_the_earth(tmp_path: Path, chunk:
     with (tmp_path / "block" / "orientations.csv").open(encoding="utf-8") as file:
         sigma = {float(row[name]) for row in csv.DictReader(file) for name in ("sx", "sy", "sz")}
     assert sorted(sigma) == pytest.approx([2e-3 * SCALE] * len(sigma))
-
-
-def test_a_chunk_in_a_local_system_is_laid_on_its_control(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    truth = simulated(tmp_path / "native", crs="local", control=CONTROL)
-    source = tmp_path / "cameras.xml"
-    marks = markers(tmp_path / "native", truth, sigmas=False)
-    source.write_text(document(cameras(truth, *level(truth)), marks, LOCAL, level(truth)[1]), encoding="utf-8")
-    assert convert(source, tmp_path / "block", "--control", str(source)) == 0
-    assert "; local, heights taken as ellipsoidal" in capsys.readouterr().out
-    with (tmp_path / "block" / "control.csv").open(encoding="utf-8") as file:
-        assert {row[name] for row in csv.DictReader(file) for name in ("sx", "sy", "sz")} == {"0.02"}  # the settings
-    found = run(tmp_path / "block" / "project.yaml")
-    for photo in nonempty(rows_of(truth["photos"])):
-        center = [found["photos"][label_of(photo["id"])][axis] for axis in "xyz"]
-        assert center == pytest.approx([photo[axis] for axis in "xyz"], abs=0.1)
 
 
 def small(*changes: tuple[str, str]) -> str:
@@ -217,27 +191,7 @@ def test_markers_beside_a_block_of_another_program(tmp_path: Path, capsys: pytes
         assert [found["points"][point][axis] for axis in "xyz"] == pytest.approx(expected, abs=3e-4)
 
 
-def test_the_largest_component_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = tmp_path / "cameras.xml"
-    pose = "<transform>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</transform>"
-    third = f'<camera id="5" sensor_id="7" component_id="1" label="DJI_5">{pose}</camera>'
-    disabled = '<camera id="6" sensor_id="7" enabled="0" label="DJI_6"><transform/></camera>'
-    source.write_text(small(("     </group>", third + disabled + "</group>")), encoding="utf-8")
-    assert convert(source, tmp_path / "block", "--control", str(source)) == 0
-    said = capsys.readouterr().out
-    assert "1 smaller component of 1 photo" in said
-    assert "1 photo that is not enabled; 1 photo that is not aligned" in said
-
-
 # ---------------------------------------------------------------------------------------------------- refusals
-
-
-def test_without_image_points_an_option_is_named(
-    tmp_path: Path, chunk: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    said = refused(capsys, chunk, tmp_path / "block")
-    assert "nothing is measured on these photos: tie points are in none of the files" in said
-    assert f"its markers are taken with --control {chunk}" in said
 
 
 MARK = '<location camera_id="1" pinned="true" x="1000" y="800"/>'
@@ -280,22 +234,3 @@ def test_what_is_wrong_is_refused(tmp_path: Path, kind: str, capsys: pytest.Capt
     said = refused(capsys, source, tmp_path / "block", "--control", str(source))
     assert words in said
     assert "cameras.xml" in said
-
-
-@pytest.mark.slow
-def test_a_damaged_file_is_refused_or_written_whole(tmp_path: Path) -> None:
-    random, whole, written = Random("metashape"), small().encode(), 0
-    source = tmp_path / "cameras.xml"
-    for number in nonempty(range(DAMAGED)):
-        source.write_bytes(damaged(whole, random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        arguments = ["--sigma", "0.5", "--control", str(source), "--control-sigma", "1"]
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(source), "-o", str(target), *arguments])
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(r"cameras\.xml(:\d+)*: ", said.getvalue()), said.getvalue()
-        else:
-            written += 1
-    assert 0.02 * DAMAGED < written < 0.9 * DAMAGED

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
-import re
-from random import Random
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from pyproj import Transformer
 
 import photostrip
-from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
-from tests.foreign.colmap_models import simulated
+from tests.foreign.colmap_models import simulated, small_model
 from tests.foreign.converting import convert, refused, with_control
 from tests.foreign.opensfm_models import BROWN, ground_control, reconstruction, tracks, write
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged, model
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -27,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def small() -> tuple[dict[str, Any], str]:
-    return reconstruction(model()), tracks(model())
+    return reconstruction(small_model()), tracks(small_model())
 
 
 # ----------------------------------------------------------------------------------------------------- results
@@ -65,29 +59,6 @@ def test_ground_control_points_come_in_with_their_marks(tmp_path: Path, capsys: 
     for point in nonempty([each for each in expected if each[0] in "GK"]):
         x, y = to_utm.transform(at[point]["x"], at[point]["y"])
         assert (x, y, at[point]["z"]) == pytest.approx([expected[point][name] for name in "xyz"], abs=3e-4)
-
-
-def test_points_without_position_are_tie_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    rays = [{"shot_id": f"DJI {n}.JPG", "projection": [0.01 * n, 0.02]} for n in range(3)]
-    place = {"latitude": 49.2, "longitude": 15.3}
-    points = [{"id": "T", "observations": rays}, {"id": "G", "position": place, "observations": rays}]
-    control = tmp_path / "gcp.json"
-    control.write_text(json.dumps({"points": points}), encoding="utf-8")
-    assert convert(source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1") == 0
-    assert "13 points, 51 rays" in capsys.readouterr().out
-    assert (tmp_path / "block/control.csv").read_text().splitlines()[1:] == ["G,15.3,49.2,,xy,control,0.1,0.1,0.1"]
-    rows = (tmp_path / "block/observations.csv").read_text().splitlines()
-    assert rows[-6:-3] == ["DJI 0.JPG,T,2750.0,1943.5", "DJI 1.JPG,T,2805.0,1943.5", "DJI 2.JPG,T,2860.0,1943.5"]
-
-
-def test_of_several_reconstructions_the_largest_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    whole, rays = small()
-    part = {**whole, "shots": {"DJI 3.JPG": whole["shots"].pop("DJI 3.JPG")}}
-    assert convert(write(tmp_path / "opensfm", [part, whole], rays), tmp_path / "block") == 0
-    said = capsys.readouterr().out
-    assert "3 photos of 1 camera" in said
-    assert "1 smaller reconstruction of 1 photo; 1 photo of the tracks without a pose: DJI 3.JPG" in said
 
 
 @pytest.mark.parametrize("kind", ["perspective", "simple_radial", "radial"])
@@ -169,16 +140,6 @@ def test_what_is_no_such_file_is_refused(
     assert expected in refused(capsys, source, tmp_path / "block")
 
 
-def test_a_folder_must_have_each_file_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    (source / "tracks.csv").rename(source / "tracks_old.csv")
-    (source / "tracks_new.csv").write_bytes((source / "tracks_old.csv").read_bytes())
-    assert "has tracks_new.csv, tracks_old.csv: one tracks.csv is read" in refused(capsys, source, tmp_path / "block")
-    for file in source.glob("tracks*"):
-        file.unlink()
-    assert "has no tracks.csv, which a reconstruction of OpenSfM needs" in refused(capsys, source, tmp_path / "block")
-
-
 def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path / "site" / "opensfm", [small()[0]], small()[1])
     told = refused(capsys, tmp_path / "site", tmp_path / "block")
@@ -235,28 +196,3 @@ def test_control_asks_for_its_precision_and_for_no_width(tmp_path: Path, capsys:
     assert "nothing says how precise the control is" in told
     given = ("--control", str(control), "--control-sigma", "0.1", "--mark-width", "100")
     assert "the marks are parts of the photo" in refused(capsys, source, tmp_path / "block", *given)
-
-
-# ----------------------------------------------------------------------------------------------------- damage
-
-
-@pytest.mark.slow
-def test_a_damaged_reconstruction_is_refused_or_written_whole(tmp_path: Path) -> None:
-    random, written = Random("opensfm"), 0
-    folder = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    whole = {name: (folder / name).read_bytes() for name in ("reconstruction.json", "tracks.csv")}
-    for number in nonempty(range(DAMAGED)):
-        for name, data in whole.items():
-            (folder / name).write_bytes(data)
-        name = random.choice(list(whole))
-        (folder / name).write_bytes(damaged(whole[name], random, WORDS))
-        target, said = tmp_path / str(number), io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(folder), "-o", str(target), "--sigma", "0.5"])
-        assert code in {0, 2}, said.getvalue()
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert re.search(r"(reconstruction\.json|tracks\.csv)(:\d+)*: ", said.getvalue()), said.getvalue()
-        elif (written := written + 1) % 10 == 0:
-            assert check_project(target / "project.yaml").faults == (), (folder / name).read_bytes()
-    assert 0.05 * DAMAGED < written < 0.9 * DAMAGED

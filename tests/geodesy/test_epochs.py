@@ -75,8 +75,3 @@ def test_an_epoch_is_asked_for_where_it_matters() -> None:
     told = notes("EPSG:25832", replace(ITRF2020, epoch=2025.5))
     assert "epoch-missing" not in told
     assert told["datum-change"].endswith("coordinates of 2025.5")
-
-
-def test_one_datum_is_no_change() -> None:
-    """Two zones of one datum."""
-    assert "datum-change" not in notes("EPSG:25832", FrameSpec("EPSG:25833", GROUND_AXES))

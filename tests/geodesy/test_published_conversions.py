@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photostrip.geodesy.curvature import eccentricity_squared
-from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic, mean_position
+from photostrip.geodesy.local_frame import (
+    IntermediateFrame,
+    axes_matrix,
+    eccentricity_squared,
+    geocentric_from_geodetic,
+    mean_position,
+)
 from tests.geodesy.frames import ENU, NEU, XYZ, columns, frame, pair, rows, spec, with_height
 from tests.loops import nonempty
-from tests.vectors import Vector, cases, section
+from tests.vectors import Vector, cases
 
 GIGS = 0.03  # m, tolerance of the GIGS projection tests
 GIGS_GEOCENTRIC = 0.01  # m
@@ -137,10 +142,6 @@ def test_geocentric_and_intermediate_vectors(example: Vector) -> None:
     assert np.linalg.det(local.axes) == pytest.approx(expected["determinant"])
     assert np.abs(local.intermediate_from_cartesian(xyz) - expected["intermediate"]).max() < tol["intermediate_m"]
     assert np.abs(local.cartesian_from_intermediate(expected["intermediate"]) - xyz).max() < tol["intermediate_m"]
-
-
-def test_every_vector_of_the_section_is_used() -> None:
-    assert [len(section(name)) for name in ("gauss_kruger", "geodesy_intermediate", "earth_curvature")] == [3, 2, 2]
 
 
 def test_the_ellipsoids_of_proj_are_those_of_the_literature() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
-from tests.geodesy.frames import NEU, XYZ, frame, pair, refused, spec, write_gtx
+from tests.geodesy.frames import NEU, frame, pair, refused, spec, write_gtx
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -56,19 +56,6 @@ def test_within_one_datum_nothing_is_shifted(first: str, second: str) -> None:
         assert "datum shift" not in given.describe() + output.describe()
 
 
-def test_frames_that_are_described_alike_are_one() -> None:
-    frames, _ = tie_frames([spec("EPSG:32633"), spec("EPSG:32633")])
-    assert frames[0] is frames[1]
-
-
-def test_a_proj_string_with_a_datum_meets_its_code() -> None:
-    """PROJ tells two datums apart here (an ensemble and its name), with nothing between them."""
-    given, output = pair("+proj=utm +zone=33 +datum=WGS84", "EPSG:32633")
-    assert (given.cartesian_from_ground(UTM33) == output.cartesian_from_ground(UTM33)).all()
-    assert given.datum_accuracy == 0.0
-    assert "datum shift" not in given.describe()
-
-
 # ------------------------------------------------------------------------------------------ between datums
 
 
@@ -97,39 +84,6 @@ def test_seven_parameters_there_and_back(towgs84: tuple[float, ...]) -> None:
     assert output.geodetic(xyz)[0, 0] == pytest.approx(math.radians(25.4), abs=0.01)
 
 
-def test_axes_are_carried_through_a_datum_shift() -> None:
-    towgs84 = (570.8, 85.7, 462.8, 40.0, -50.0, 60.0, 3.56)
-    text = "+proj=tmerc +lon_0=27 +x_0=500000 +ellps=krass"
-    given, _ = pair(f"{text} +towgs84={','.join(map(str, towgs84))}", "EPSG:32635")
-    own = frame(text)
-    turned = helmert(
-        own.axes_at(own.cartesian_from_ground(PULKOVO)).reshape(-1, 3), (0.0, 0.0, 0.0, *towgs84[3:6], 0.0)
-    )
-    axes = given.axes_at(given.cartesian_from_ground(PULKOVO))
-    assert (given.axes_at(given.cartesian_from_ground(PULKOVO), np.array(PULKOVO)) == axes).all()
-    assert axes.reshape(-1, 3) == pytest.approx(turned, abs=1e-6)  # small rotations are not quite rotations
-    assert np.abs(own.axes_at(own.cartesian_from_ground(PULKOVO)) - axes).max() > 1e-4
-    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.broadcast_to(np.eye(3), (2, 3, 3)), abs=1e-14)
-    own_convergence = own.convergence(own.cartesian_from_ground(PULKOVO))
-    assert given.convergence(given.cartesian_from_ground(PULKOVO)) == pytest.approx(own_convergence, abs=1e-12)
-
-
-def test_a_geographic_and_a_geocentric_frame_on_a_foreign_datum() -> None:
-    geographic, geocentric = (
-        pair(
-            spec(f"+proj={name} +ellps=krass +towgs84=23.57,-140.95,-79.8,0,0.35,0.79,-0.22", axes=axes), "EPSG:32635"
-        )[0]
-        for name, axes in (("longlat", NEU), ("geocent", XYZ))
-    )
-    point = np.array([[25.4, 42.5, 600.0]])
-    xyz = geographic.cartesian_from_ground(point)
-    own = geocentric.ground_from_cartesian(xyz)
-    assert own == pytest.approx(frame("+proj=longlat +ellps=krass").cartesian_from_ground(point), abs=MICROMETRE)
-    assert geocentric.cartesian_from_ground(own) == pytest.approx(xyz, abs=MICROMETRE)
-    assert np.abs(geographic.difference(geographic.ground_from_cartesian(xyz), point)).max() < MICROMETRE
-    assert geographic.axes_at(xyz)[0] @ geographic.axes_at(xyz)[0].T == pytest.approx(np.eye(3), abs=1e-14)
-
-
 def test_a_shift_that_proj_knows_is_told_with_its_accuracy() -> None:
     given, output = pair(spec("EPSG:28405", axes=NEU), "EPSG:32635")
     assert given.describe().endswith("; datum shift: chosen by PROJ at the first point")
@@ -156,26 +110,6 @@ def test_all_points_of_a_datum_are_shifted_by_one_operation() -> None:
     (first, second), _ = tie_frames([spec("EPSG:23030"), spec("EPSG:23031")], spec("EPSG:32630"))
     first.cartesian_from_ground(south)
     assert second.datum_shift == first.datum_shift  # both zones hang on one datum
-
-
-def test_a_shift_may_be_met_backwards_first() -> None:
-    there, _ = pair("EPSG:28405", "EPSG:32635")
-    back, _ = pair("EPSG:28405", "EPSG:32635")
-    points = np.array([[5370000.0, 4710000.0, 550.0]])
-    assert np.abs(back.ground_from_cartesian(there.cartesian_from_ground(points)) - points).max() < MICROMETRE
-
-
-def test_paris_counts_from_paris_and_meets_greenwich() -> None:
-    """PROJ's own transformation of the same point, in one step."""
-    from pyproj import CRS, Transformer
-
-    given, output = pair("EPSG:27572", "EPSG:2154")
-    point = (600000.0, 2200000.0, 10.0)
-    ends = CRS("EPSG:27572").to_3d(), CRS("EPSG:2154").to_3d()
-    expected = Transformer.from_crs(*ends, always_xy=True, allow_ballpark=False).transform(*point)
-    found = output.ground_from_cartesian(given.cartesian_from_ground([point]))[0]
-    assert found == pytest.approx(expected, abs=1e-4)
-    assert given.geodetic(given.cartesian_from_ground([point]))[0, 0] == pytest.approx(0.0, abs=1e-12)  # Paris
 
 
 @pytest.mark.parametrize(
@@ -226,18 +160,6 @@ def test_datums_without_a_sound_way_between_them(first: str, second: str, reason
     assert refused(first, output=spec(second)) == [expected]
 
 
-def test_an_ellipsoid_of_the_earth_is_no_datum_but_that_of_another_body_is() -> None:
-    wgs84 = (6378137.0, 6356752.314245179)
-    ellipsoid_only = spec("geocentric", ellipsoid=(6378245.0, 6356863.018773047))
-    assert "geocentric (a = 6378245.0 m, b = 6356863.018773047 m) states an ellipsoid but no datum" in (
-        refused(ellipsoid_only, "EPSG:28405")[0] + refused("EPSG:28405", ellipsoid_only)[0]
-    )
-    given, _ = pair(spec("geocentric", ellipsoid=wgs84), "EPSG:32633")
-    assert given.datum_shift == ""  # the ellipsoid of WGS 84 is meant as WGS 84
-    given, _ = pair(spec("geocentric", ellipsoid=(3396190.0, 3376200.0)), "+proj=eqc +a=3396190 +b=3376200")
-    assert given.datum_shift == ""
-
-
 # ------------------------------------------------------------------------------------------------- heights
 
 
@@ -247,13 +169,6 @@ def test_a_constant_undulation_lifts_heights_to_the_ellipsoid() -> None:
     assert given.cartesian_from_ground(UTM33) == pytest.approx(output.cartesian_from_ground(lifted), abs=1e-9)
     assert given.ground_from_cartesian(output.cartesian_from_ground(lifted)) == pytest.approx(UTM33, abs=MICROMETRE)
     assert given.describe().endswith("plan in metres, orthometric heights in metres, geoid undulation +45.500 m")
-
-
-def test_a_three_dimensional_crs_has_ellipsoidal_heights() -> None:
-    given, output = pair(spec("EPSG:4979", axes=NEU), "EPSG:32633")
-    assert given.user_from_internal([15.0, 45.0, 100.0]) == pytest.approx((45.0, 15.0, 100.0))
-    found = output.ground_from_cartesian(given.cartesian_from_ground([[15.0, 45.0, 100.0]]))[0]
-    assert found == pytest.approx((500000.0, 4982950.4, 100.0), abs=0.05)
 
 
 @pytest.fixture
@@ -277,51 +192,6 @@ def test_heights_above_a_geoid_grid(geoid: Path, how: str) -> None:
     assert flat.ground_from_cartesian(xyz)[:, :2] == pytest.approx(UTM33[:, :2], abs=MICROMETRE)
     assert np.abs(given.ground_from_cartesian(xyz) - UTM33).max() < MICROMETRE
     assert given.describe().endswith(f"orthometric heights in metres (geoid grid {name})")
-
-
-def test_a_geoid_grid_refers_to_wgs_84_under_a_shifted_datum(geoid: Path) -> None:
-    towgs84 = "+towgs84=23.57,-140.95,-79.8,0,0.35,0.79,-0.22"
-    text = f"+proj=tmerc +lon_0=15 +x_0=500000 +ellps=krass {towgs84} +geoidgrids={geoid}"
-    given, output = pair(spec(text, height="orthometric"), "EPSG:32633")
-    xyz = given.cartesian_from_ground(UTM33)
-    lon, lat, height = output.geodetic(xyz).T
-    undulation = 40.0 + (np.degrees(lon) - 10.0) + 2.0 * (np.degrees(lat) - 40.0)
-    assert height == pytest.approx(UTM33[:, 2] + undulation, abs=1e-3)
-    assert np.abs(given.ground_from_cartesian(xyz) - UTM33).max() < MICROMETRE
-
-
-def test_a_geoid_grid_under_feet(geoid: Path) -> None:
-    foot = 1200.0 / 3937.0
-    text = f"+proj=utm +zone=33 +datum=WGS84 +units=us-ft +vunits=us-ft +geoidgrids={geoid}"
-    metric = f"+proj=utm +zone=33 +datum=WGS84 +geoidgrids={geoid}"
-    given, output = pair(spec(text, height="orthometric"), spec(metric, height="orthometric"))
-    assert (given.plan_unit, given.height_unit) == ("US survey foot", "US survey foot")
-    xyz = given.cartesian_from_ground(UTM33 / foot)
-    assert output.ground_from_cartesian(xyz) == pytest.approx(UTM33, abs=1e-5)
-    assert given.ground_from_cartesian(xyz) == pytest.approx(UTM33 / foot, abs=1e-5)
-
-
-@pytest.mark.slow
-def test_a_compound_crs_finds_its_grid_when_it_is_installed(tmp_path: Path) -> None:
-    """EGM96 from a data directory, in a process of its own: PROJ remembers where it has looked."""
-    write_gtx(tmp_path / "egm96_15.gtx", np.full((11, 11), 44.25), south=40.0, west=10.0, step=1.0)
-    program = """
-from photostrip.geodesy.frame_spec import FrameSpec
-from photostrip.geodesy.tying import tie_frames
-axes = ("east", "north", "up")
-(own,), out = tie_frames([FrameSpec("EPSG:32633+5773", axes, height="orthometric")], FrameSpec("EPSG:32633", axes))
-print(round(out.ground_from_cartesian(own.cartesian_from_ground([[5e5, 5e6, 100.0]]))[0, 2], 6))
-print(own.describe())
-"""
-    code = f"import pyproj; pyproj.datadir.append_data_dir({str(tmp_path)!r})\n{program}"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == [
-        "144.25",
-        (
-            "EPSG:32633+5773 (WGS 84 / UTM zone 33N + EGM96 height): east, north, up; plan in metres, orthometric"
-            " heights in metres (EGM96 height)"
-        ),
-    ]
 
 
 def test_points_outside_a_geoid_grid_are_named(geoid: Path) -> None:
@@ -371,12 +241,6 @@ def test_a_file_that_is_no_grid_is_refused(tmp_path: Path) -> None:
         InputError, match=r"PROJ cannot read the grid|outside the geoid grid"
     ):  # it says so late, or early
         frame(crs, height="orthometric").cartesian_from_ground(UTM33)
-
-
-def test_a_geoid_grid_needs_a_datum_under_it(geoid: Path) -> None:
-    crs = f"+proj=utm +zone=33 +ellps=krass +geoidgrids={geoid}"
-    (found,) = refused(spec(crs, height="orthometric"))
-    assert "a geoid grid refers to WGS 84, and the datum of the plan is not stated (add +towgs84 or +datum)" in found
 
 
 @pytest.mark.parametrize(
@@ -518,11 +382,6 @@ def test_a_crs_that_proj_does_not_know() -> None:
     )
 
 
-def test_depths_are_no_heights() -> None:
-    (found,) = refused(spec("EPSG:32633+5706", height="orthometric"))
-    assert found == "control[0].crs: the third axis of EPSG:32633+5706 points down; expected heights, positive upwards"
-
-
 @pytest.mark.parametrize(
     ("description", "expected"),
     [
@@ -594,15 +453,6 @@ def test_local_and_geodetic_frames_do_not_mix() -> None:
     assert refused("EPSG:32633", output=spec("local")) == [f"output.crs: local {message.format('EPSG:32633')}"]
 
 
-def test_the_curvature_correction_counts_before_and_after_or_never() -> None:
-    expected = "the curvature correction differs from that of control[0]: it counts before and after, or never"
-    assert refused(spec("local", curvature_radius=6.37e6), output=spec("local")) == [f"output.crs: {expected}"]
-
-
-def test_a_project_without_a_frame() -> None:
-    assert refused() == ["no ground frame is given; expected a control list with its crs"]
-
-
 @pytest.mark.slow
 def test_all_faults_come_at_once_each_at_its_key() -> None:
     found = refused(
@@ -615,16 +465,6 @@ def test_all_faults_come_at_once_each_at_its_key() -> None:
     assert keys == ["control[0].crs", "control[1].axes", "control[1].ellipsoid", "control[1].height", "output.crs"]
     grids = refused(spec("EPSG:32633+5773", height="orthometric"), "IAU_2015:30110", output=spec("EPSG:32633"))
     assert [line.split(":")[0] for line in grids] == ["control[0].crs", "control[1].crs"]
-
-
-def test_a_long_wkt_is_named_by_its_title() -> None:
-    from pyproj import CRS
-
-    wkt = CRS("EPSG:28405").to_wkt(pretty=True)
-    assert spec(wkt).name == 'WKT "Pulkovo 1942 / Gauss-Kruger zone 5"'
-    given, _ = pair(spec(wkt, axes=NEU), spec("EPSG:28405", axes=NEU))
-    assert given.datum_shift == ""
-    assert given.describe().startswith('WKT "Pulkovo 1942 / Gauss-Kruger zone 5"')
 
 
 # --------------------------------------------------------------------------------------- what is not loaded

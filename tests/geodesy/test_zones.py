@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pyproj import Transformer
 
-from photostrip.geodesy.zones import join_zones
+from photostrip.geodesy.crs import join_zones
 
 WEST, EAST = "EPSG:28404", "EPSG:28405"  # Gauss zones of 6 degrees, north first; they meet at 24 degrees
 TO_EAST = Transformer.from_crs(WEST, EAST)

@@ -20,8 +20,8 @@ from photostrip.geometry.rotation import (
     from_angles,
     from_vector,
 )
-from tests.attitudes import angle_between, rotation_x, rotation_y, rotation_z
-from tests.vectors import cases, section
+from tests.attitudes import angle_between
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,7 +35,6 @@ ANGLES = st.floats(-np.pi, np.pi)
 MIDDLE = st.floats(np.radians(-89), np.radians(89))
 NUMBERS = st.floats(-1e3, 1e3)
 VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
-DIRECTIONS = VECTORS.filter(lambda v: np.linalg.norm(v) > 1e-3)
 LOOKING = np.array([0.0, 0.0, -1.0])  # of the camera, in the photo's frame
 
 
@@ -64,10 +63,6 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
     assert difference == pytest.approx(expected["kappa_difference_opk_minus_aok_deg"], abs=tol)
 
 
-def test_all_examples_are_here() -> None:
-    assert len(section("rotation")) == 5
-
-
 # ----------------------------------------------------------------------------------- another library
 
 
@@ -88,15 +83,6 @@ def test_systems_are_intrinsic_turns_of_scipy(system: str, order: str, signs: tu
     assert np.allclose(angles(theirs, system), turns, rtol=0, atol=1e-9)
 
 
-def test_elementary_rotations_follow_the_right_hand() -> None:
-    turn = np.linspace(-4, 4, 17)
-    for axis, function in zip("xyz", (rotation_x, rotation_y, rotation_z), strict=True):
-        assert np.allclose(function(turn), Rotation.from_euler(axis, turn[:, None]).as_matrix(), rtol=0, atol=ROUNDING)
-    assert np.allclose(rotation_z(np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=ROUNDING)
-    assert np.allclose(rotation_x(np.pi / 2) @ [0, 1, 0], [0, 0, 1], atol=ROUNDING)
-    assert np.allclose(rotation_y(np.pi / 2) @ [0, 0, 1], [1, 0, 0], atol=ROUNDING)
-
-
 @given(VECTORS)
 def test_a_rotation_vector_turns_as_scipy_says(vector: tuple[float, float, float]) -> None:
     short = np.array(vector) / 250  # up to two turns
@@ -114,24 +100,6 @@ def test_the_angle_between_attitudes_is_that_of_scipy(first: int, second: int) -
 # ------------------------------------------------------------------------------------------ invariants
 
 
-@given(ANGLES, MIDDLE, ANGLES, st.sampled_from(SYSTEMS))
-def test_every_rotation_is_orthogonal_and_comes_back(first: float, middle: float, kappa: float, system: str) -> None:
-    matrix = from_angles([first, middle, kappa], system)
-    assert np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=ROUNDING)
-    assert np.linalg.det(matrix) == pytest.approx(1, abs=ROUNDING)
-    again = from_angles(angles(matrix, system), system)
-    assert np.allclose(again, matrix, rtol=0, atol=1e-13)
-
-
-@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), ANGLES)
-def test_closed_relations_of_the_two_systems(alpha: float, omega: float, kappa: float) -> None:
-    omega2, phi2, kappa2 = angles(from_alpha_omega_kappa(alpha, omega, kappa), "omega-phi-kappa")
-    assert np.sin(phi2) == pytest.approx(-np.sin(alpha) * np.cos(omega), abs=1e-13)
-    assert np.tan(omega2) == pytest.approx(np.tan(omega) / np.cos(alpha), rel=1e-9, abs=1e-12)
-    difference = (kappa2 - kappa + np.pi) % (2 * np.pi) - np.pi
-    assert np.tan(difference) == pytest.approx(np.tan(alpha) * np.sin(omega), rel=1e-8, abs=1e-12)
-
-
 @given(ANGLES, MIDDLE, ANGLES)
 def test_phi_is_minus_alpha_and_nothing_else_changes(alpha: float, omega: float, kappa: float) -> None:
     assert np.array_equal(
@@ -146,20 +114,6 @@ def test_signs_of_the_angles() -> None:
     assert (from_alpha_omega_kappa(0, 0, small) @ [1, 0, 0])[1] > 0  # kappa positive: x turns counter-clockwise
 
 
-@given(VECTORS, VECTORS)
-def test_the_cross_matrix_is_the_cross_product(first: tuple[float, ...], second: tuple[float, ...]) -> None:
-    assert np.allclose(cross_matrix(first) @ second, np.cross(first, second), rtol=1e-12, atol=1e-9)
-
-
-@given(DIRECTIONS, st.floats(0, 3.1))
-def test_a_rotation_vector_keeps_its_axis_and_turns_by_its_length(axis: tuple[float, ...], angle: float) -> None:
-    unit = np.array(axis) / np.linalg.norm(axis)
-    matrix = from_vector(unit * angle)
-    assert np.allclose(matrix @ unit, unit, rtol=0, atol=1e-13)
-    assert angle_between(np.eye(3), matrix) == pytest.approx(angle, abs=1e-7)
-    assert np.allclose(from_vector(-unit * angle), matrix.T, rtol=0, atol=1e-13)
-
-
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-12, 0.99e-9, 1.01e-9, 1e-8, 1e-5])
 def test_tiny_rotations_lose_nothing(size: float) -> None:
     vector = np.array([0.6, 0.0, 0.8]) * size
@@ -167,18 +121,6 @@ def test_tiny_rotations_lose_nothing(size: float) -> None:
     first_order = np.eye(3) + cross_matrix(vector) + cross_matrix(vector) @ cross_matrix(vector) / 2
     assert np.allclose(matrix, first_order, rtol=0, atol=2e-16 + size**3)
     assert angle_between(matrix, np.eye(3)) == pytest.approx(size, rel=1e-6, abs=1e-300)
-
-
-def test_leading_axes_of_any_shape() -> None:
-    turns = np.random.default_rng(2).uniform(-1, 1, (4, 5, 3))
-    for system in SYSTEMS:
-        many = from_angles(turns, system)
-        assert many.shape == (4, 5, 3, 3)
-        assert np.array_equal(many[2, 3], from_angles(turns[2, 3], system))
-        assert angles(many, system).shape == (4, 5, 3)
-    assert from_alpha_omega_kappa(turns[..., 0], 0.0, turns[0, :, 2]).shape == (4, 5, 3, 3)
-    assert from_vector(turns).shape == (4, 5, 3, 3)
-    assert angle_between(from_vector(turns), np.eye(3)).shape == (4, 5)
 
 
 # ---------------------------------------------------------------------------------------------- refused
@@ -195,16 +137,3 @@ def test_a_middle_angle_of_ninety_degrees_is_refused_by_name(system: str, sign: 
     assert caught.value.exit_code == EXIT_GEOMETRY
     assert f"{middle} is 90 degrees" in str(caught.value)
     assert f": {first} and {last} cannot be separated" in str(caught.value)
-
-
-def test_close_to_ninety_degrees_is_not_refused() -> None:
-    for system in SYSTEMS:
-        turn = [0.3, np.radians(89.99), 0.2]
-        assert np.allclose(angles(from_angles(turn, system), system), turn, rtol=0, atol=1e-9)
-
-
-def test_an_unknown_system_is_named() -> None:
-    with pytest.raises(ValueError, match="unknown system of angles 'kappa-phi-omega'"):
-        angles(np.eye(3), "kappa-phi-omega")
-    with pytest.raises(ValueError, match="unknown system of angles 'kappa-phi-omega'"):
-        from_angles([0, 0, 0], "kappa-phi-omega")

@@ -70,22 +70,23 @@ def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "overrides", "options"),
+    ("kind", "overrides", "keys"),
     [
-        ("model", {"control": {"layout": "six"}}, ["--control", "six"]),
-        ("strip", {"models": 8}, ["--models", "8"]),
+        ("model", {"control": {"layout": "six"}}, ["control={layout: six}"]),
+        ("strip", {"models": 8}, ["models=8"]),
         ("displacement", {"camera": "UMK 10/1318", "base": 30, "distances": [50]},
-         ["--camera", "UMK 10/1318", "--base", "30", "--distances", "50"]),
-        ("screening", {"repetitions": 1, "methods": ["auto"]}, ["--repetitions", "1", "--methods", "auto"]),
+         ["camera=UMK 10/1318", "base=30", "distances=[50]"]),
+        ("screening", {"repetitions": 1, "methods": ["auto"]}, ["repetitions=1", "methods=[auto]"]),
     ],
 )  # fmt: skip
 def test_plans_are_those_of_the_command(
-    kind: photostrip.library.plan.PlanKind,
+    kind: photostrip.planning.PlanKind,
     overrides: dict[str, Any],
-    options: list[str],
+    keys: list[str],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = photostrip.plan(kind, **overrides)
+    options = [f"--set={key}" for key in keys]
     assert main(["plan", kind, *options, "--format", "json"]) == 0
     assert json.loads(capsys.readouterr().out) == found.document
     assert main(["plan", kind, *options, "--format", "md"]) == 0

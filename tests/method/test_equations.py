@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
-from photostrip.cli.jobs.sources.tables import rows_of
 from photostrip.cli.main import main
+from photostrip.sheets.sources import read
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
@@ -34,7 +34,7 @@ class Row(NamedTuple):
 
 
 def rows() -> list[Row]:
-    return [Row(row["equation"], row["command"], row["function"]) for row in nonempty(rows_of("equations"))]
+    return [Row(row["equation"], row["command"], row["function"]) for row in nonempty(read("equations"))]
 
 
 def code_of(name: str) -> CodeType:

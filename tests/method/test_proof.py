@@ -22,7 +22,7 @@ from photostrip.camera import Camera, Distortion
 from photostrip.network.settings import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
 from photostrip.simulation import (
     DIGITAL,
@@ -31,16 +31,13 @@ from photostrip.simulation import (
     Film,
     Flight,
     Ground,
-    Image,
     Points,
     Simulation,
     Spec,
     Terrain,
     simulate,
 )
-from photostrip.strip.polynomial import correction
-from photostrip.strip.relative_orientation.orientation import RelativeSettings
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip import polynomial
 from tests.attitudes import angle_between
 from tests.loops import nonempty
 from tests.results import rotation
@@ -138,50 +135,6 @@ def assert_exact(found: Recovery) -> None:
 # ------------------------------------------------------------------------------------------------ free of errors
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("photos", [3, 10, 50, 200])
-def test_a_strip_of_any_length_comes_back(photos: int) -> None:
-    assert_exact(recovered(exact(Spec(flight=Flight(photos=photos)))))
-
-
-@pytest.mark.parametrize(
-    ("heading", "rotation"),
-    [(0.0, 0.0), (0.0, 33.0), (45.0, 90.0), (90.0, 180.0), (90.0, 270.0), (197.0, 33.0), (300.0, 0.0)],
-)
-def test_photos_turned_in_any_way_and_flown_anywhere_come_back(heading: float, rotation: float) -> None:
-    assert_exact(recovered(exact(Spec(flight=Flight(photos=6, heading_deg=heading, photo_rotation_deg=rotation)))))
-
-
-@pytest.mark.parametrize(
-    "terrain",
-    [
-        Terrain(relief=0.0),
-        Terrain(relief=500.0, wavelength=2000.0),  # a third of the flying height
-        Terrain(height=3500.0, relief=300.0, slope_percent=(10.0, -15.0)),
-    ],
-    ids=["flat", "mountains", "slope"],
-)
-def test_any_terrain_comes_back(terrain: Terrain) -> None:
-    assert_exact(recovered(exact(Spec(terrain=terrain, flight=Flight(end_lap_percent=68.0)))))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "flight",
-    [
-        Flight(attitude_sigma_deg=(5.0, 5.0, 5.0), end_lap_percent=75.0),
-        Flight(end_lap_percent=80.0),
-        Flight(photos=8, strips=3, side_lap_percent=35.0),
-        Flight(photos=7, strips=2, side_lap_percent=35.0, alternate=True),
-        Flight(scale=50_000.0),
-        Flight(scale=4000.0),
-    ],
-    ids=["tilted", "80 percent", "three strips", "there and back", "small scale", "large scale"],
-)
-def test_any_flight_comes_back(flight: Flight) -> None:
-    assert_exact(recovered(exact(Spec(flight=flight))))
-
-
 MOON = "+proj=longlat +a=1737400 +b=1737400 +no_defs"
 
 
@@ -253,25 +206,12 @@ def test_any_control_that_determines_the_strip_brings_it_back(control: Control, 
 @pytest.mark.parametrize("degree", ["1", "2", "3"])
 def test_no_adjustment_spoils_what_is_exact(adjustment: str, degree: str) -> None:
     spec = exact(Spec(flight=Flight(photos=15), control=Control(bands=4)))
-    asked = Settings(adjustment=adjustment, polynomial=correction.PolynomialSettings(degree))
+    asked = Settings(adjustment=adjustment, polynomial=polynomial.PolynomialSettings(degree))
     found = recovered(spec, asked)
     assert_exact(found)
     used = found.result.strips[0].polynomial
     assert (used is None) == (adjustment == "similarity")
     assert used is None or used.degree == int(degree)
-
-
-@pytest.mark.parametrize(
-    "asked",
-    [
-        Settings(formation=StripFormationSettings("distances")),
-        Settings(relative=RelativeSettings(screening="tau")),
-        Settings(relative=RelativeSettings(screening="none")),
-    ],
-    ids=["distances", "tau", "no screening"],
-)
-def test_no_way_of_working_spoils_what_is_exact(asked: Settings) -> None:
-    assert_exact(recovered(exact(Spec()), asked))
 
 
 def distorted(direction: str) -> Camera:
@@ -341,22 +281,6 @@ def test_whatever_is_flown_comes_back(
     assert_exact(recovered(exact(spec)))
 
 
-@pytest.mark.slow
-def test_points_common_to_strips_agree() -> None:
-    spec = exact(Spec(flight=Flight(photos=8, strips=3, side_lap_percent=35.0)))
-    found = recovered(spec, Settings(adjustment="polynomial"))
-    ties = found.result.ties
-    assert len(ties.number) >= 30
-    assert {tuple(pair) for pair in ties.strips.tolist()} == {(0, 1), (1, 2)}
-    assert np.abs(ties.difference).max() < MICRON
-
-
-def test_the_final_orientations_fit_the_adjusted_points() -> None:
-    strip = recovered(exact(Spec(flight=Flight(photos=30)))).result.strips[0]
-    assert np.abs(strip.of_photos.resection.residuals).max() < 1e-9  # mm
-    assert strip.scale_number == pytest.approx(10_000.0, rel=0.01)
-
-
 # ------------------------------------------------------------------------------------------- rotations and frames
 
 
@@ -390,14 +314,6 @@ def test_rotations_refer_to_the_grid_of_a_projection() -> None:
     np.testing.assert_allclose(rotation(middle).ravel(), [sin, -cos, 0, cos, sin, 0, 0, 0, 1], rtol=0, atol=2e-9)
 
 
-@pytest.mark.parametrize("crs", ["geocentric", "local"])
-def test_rotations_refer_to_the_axes_of_a_cartesian_frame(crs: str) -> None:
-    axes = ("x", "y", "z") if crs == "geocentric" else ("east", "north", "up")
-    found = recovered(exact(Spec(ground=Ground(crs=crs, axes=axes))))
-    written = np.array([rotation(photo) for photo in document_of(found.result)["photos"]])
-    np.testing.assert_allclose(written, found.simulation.truth.rotations, rtol=0, atol=2e-9)
-
-
 # ------------------------------------------------------------------------------------------------ with errors
 
 
@@ -411,7 +327,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
             simple = choice == "similarity"
             asked = Settings(
                 adjustment="similarity" if simple else "polynomial",
-                polynomial=correction.PolynomialSettings("auto" if simple else choice),
+                polynomial=polynomial.PolynomialSettings("auto" if simple else choice),
                 precision=False,
             )
             squares[choice].append(Recovery(done, triangulate(inputs, asked)).along_across_up())
@@ -437,28 +353,6 @@ def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
     assert found.rotations > 1e-6
     assert float(np.median(strip.of_photos.orientation.sigma0)) == pytest.approx(0.005, rel=0.15)
     assert 0.003 < float(np.sqrt((strip.of_photos.resection.residuals**2).mean())) < 0.008  # mm
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sigma_um", [0.05, 0.5, 20.0])
-def test_errors_are_proportional_to_the_noise(sigma_um: float) -> None:
-    spec = strip_of(6, 3)
-    spec = replace(spec, control=replace(spec.control, noise=EXACT_CONTROL, sigma=(1e-4, 1e-4, 1e-4)))
-    asked = Settings(adjustment="similarity", relative=RelativeSettings(screening="none"))
-    small, large = (
-        recovered(replace(spec, image=Image(sigma_um=size)), asked).errors for size in (0.1 * sigma_um, sigma_um)
-    )
-    np.testing.assert_allclose(10 * small, large, rtol=0, atol=0.1 * np.abs(large).max())
-
-
-@pytest.mark.slow
-def test_relative_orientation_finds_the_noise() -> None:
-    """Mean over many pairs of the estimated variance, with its own standard error."""
-    spec = replace(strip_of(200, 20), seed=3)
-    strip = recovered(spec, Settings(relative=RelativeSettings(screening="none"))).result.strips[0]
-    redundancy = strip.of_photos.orientation.points_used - 5
-    variance = float((strip.of_photos.orientation.sigma0**2 @ redundancy) / redundancy.sum()) / 0.005**2
-    assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))
 
 
 @pytest.mark.slow
@@ -572,71 +466,7 @@ def test_a_check_point_never_influences_anything(change: str, curvature: str) ->
         assert np.abs(np.abs(at_check) - [1e5, 3e5, 4e3]).max() < 10.0
 
 
-def shuffled(inputs: Inputs, seed: int) -> Inputs:
-    """The same tables with rows, points, photos and control in another order."""
-    rng = np.random.default_rng(seed)
-    given_points = inputs.observations
-    rows = rng.permutation(len(given_points))
-    photos, points = (rng.permutation(len(ids)) for ids in (given_points.photo_ids, given_points.point_ids))
-    observations = PhotoPoints(
-        tuple(given_points.photo_ids[n] for n in photos),
-        tuple(given_points.point_ids[n] for n in points),
-        np.argsort(photos)[given_points.photo[rows]],
-        np.argsort(points)[given_points.point[rows]],
-        given_points.xy[rows],
-        given_points.sigma[rows],
-    )
-    return replace(inputs, observations=observations, control=inputs.control.take(rng.permutation(len(inputs.control))))
-
-
-def coordinates(result: Result) -> dict[str, Floats]:
-    """Points and photos of a result by their ids."""
-    ids = result.inputs.observations.point_ids
-    found = {f"point {ids[n]}": xyz for n, xyz in zip(result.points.number, result.points.cartesian, strict=True)}
-    for strip in result.strips:
-        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
-        rotations = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
-        for photo, center, turn in zip(strip.strip.photos, centers, rotations, strict=True):
-            found[f"photo {photo}"] = np.vstack([center, turn])
-    return found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
-    _, inputs = noisy_project()
-    straight = coordinates(noisy_result())
-    mixed = coordinates(triangulate(shuffled(inputs, seed), Settings()))
-    assert straight.keys() == mixed.keys()
-    for name, values in straight.items():
-        np.testing.assert_allclose(mixed[name], values, rtol=0, atol=MICRON, err_msg=name)
-
-
-@pytest.mark.slow
-def test_names_do_not_matter() -> None:
-    _, inputs = noisy_project()
-    names = {name: f"{n * 7919 % 100_003:05d}" for n, name in enumerate(inputs.observations.point_ids)}
-    renamed = replace(
-        inputs,
-        observations=replace(inputs.observations, point_ids=tuple(names.values())),
-        control=replace(inputs.control, ids=tuple(names[name] for name in inputs.control.ids)),
-    )
-    before, after = numbers(noisy_result()), numbers(triangulate(renamed, Settings()))
-    for name, values in before.items():
-        np.testing.assert_array_equal(values, after[name], err_msg=name)
-
-
 @pytest.mark.slow
 def test_twice_is_the_same() -> None:
     _, inputs = noisy_project()
     assert document_of(triangulate(inputs, Settings())) == document_of(noisy_result())
-
-
-@pytest.mark.parametrize("backwards", [False, True])
-def test_a_strip_may_be_listed_from_either_end(backwards: bool) -> None:
-    """Another first photo, another chain, other rounding: free of errors, the same result."""
-    done = simulate(exact(Spec(flight=Flight(photos=12))))
-    inputs = inputs_of(done)
-    strip = inputs.strips[0]
-    listed = replace(strip, photos=strip.photos[::-1] if backwards else strip.photos)
-    assert_exact(Recovery(done, triangulate(replace(inputs, strips=(listed,)), Settings())))

@@ -9,18 +9,16 @@ import numpy as np
 import pytest
 
 import photostrip
-from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
+from photostrip.errors import EXIT_INPUT, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.points import PhotoPoints
 from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
-from photostrip.strip import absolute_orientation
-from photostrip.strip.polynomial import correction
-from tests.loops import nonempty
+from photostrip.strip import absolute_orientation, polynomial
 from tests.results import write_project
-from tests.simulated import inputs_of, settings_of
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
-CUBIC = ("1", "X", "Y", "XY", "X^2", "X^3")
 SIMILARITY = Settings(adjustment="similarity")
 LOCAL = FrameSpec("local", ("east", "north", "up"))
 PLANE_MAP = replace(
@@ -42,7 +39,7 @@ PLANE_MAP = replace(
 
 
 def degree(asked: str) -> Settings:
-    return Settings(adjustment="polynomial", polynomial=correction.PolynomialSettings(asked))
+    return Settings(adjustment="polynomial", polynomial=polynomial.PolynomialSettings(asked))
 
 
 def errors(simulation: Simulation, result: Result) -> Floats:
@@ -53,10 +50,6 @@ def errors(simulation: Simulation, result: Result) -> Floats:
 
 def rms(values: Floats) -> float:
     return float(np.sqrt((values**2).mean()))
-
-
-def codes(result: Result) -> set[str]:
-    return {note.code for note in result.notes}
 
 
 def true_places(simulation: Simulation, strip: StripResult) -> Floats:
@@ -101,73 +94,7 @@ def test_six_points_fit_a_cubic_perfectly_and_say_nothing_between(seed: int) -> 
     assert np.abs(bent).max() > 5.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_stations_count_not_points(seed: int) -> None:
-    done, inputs = six_points(seed)
-    result = triangulate(inputs, degree("3"))
-    found = result.strips[0].polynomial
-    assert found is not None
-    assert found.stations == (3, 3)
-    assert found.degree == 2
-    assert all("X^3" not in axis.terms for axis in nonempty(found.axes))
-    assert "degree-reduced" in codes(result)
-    assert "3 stations" in next(note.message for note in result.notes if note.code == "degree-reduced")
-    assert np.abs(errors(done, result)).max() < 1.5
-    assert np.abs(errors(done, triangulate(inputs, degree("auto")))).max() < 2.0
-
-
-@pytest.mark.slow
-def test_four_stations_carry_a_cubic() -> None:
-    done = simulate(Spec(flight=Flight(photos=21, end_lap_percent=62.0), control=Control(bands=4, per_band=2)))
-    result = triangulate(inputs_of(done), degree("3"))
-    found = result.strips[0].polynomial
-    assert found is not None
-    assert found.stations == (4, 4)
-    assert found.axes[0].terms == CUBIC
-    assert "degree-reduced" not in codes(result)
-
-
 # --------------------------------------------------------- the X axis of the polynomials along the meridian
-
-
-def east_west_strip() -> tuple[Simulation, StripResult, Result]:
-    """Twenty models from west to east with a systematic error: a lens whose distortion nobody knows of."""
-    spec = Spec(
-        flight=Flight(photos=21, end_lap_percent=62.0, heading_deg=90.0),
-        image=Image(sigma_um=0.0),
-        control=Control(bands=4, noise=(0.0, 0.0, 0.0), sigma=(0.02, 0.02, 0.02)),
-    )
-    done = simulate(spec)
-    inputs = inputs_of(done)
-    xy = inputs.observations.xy
-    radius = np.hypot(*xy.T)[:, None]
-    bad = replace(inputs, observations=replace(inputs.observations, xy=xy * (1 + 2e-8 * radius**2)))  # 20 um at 100 mm
-    result = triangulate(bad, replace(SIMILARITY, polynomial=correction.PolynomialSettings("3")))
-    return done, result.strips[0], result
-
-
-def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Floats, correction.Polynomial]:
-    """Fit a cubic in a frame with its X axis in some azimuth; points come back in the Cartesian frame."""
-    frame = strip.intermediate.with_azimuth(azimuth)
-    xyz = frame.intermediate_from_cartesian(strip.cartesian)
-    targets = absolute_orientation.Targets(strip.control, result.frames, frame)
-    weight = absolute_orientation.weights(strip.control, strip.precision)
-    breadth = float(np.quantile(np.abs(xyz[:, 1]), 0.95))
-    problem = correction.FitProblem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
-    found = correction.fit(problem, correction.PolynomialSettings("3"))
-    return frame.cartesian_from_intermediate(found(xyz)), found
-
-
-@pytest.mark.slow
-def test_an_x_axis_along_the_meridian_spoils_the_polynomial_of_an_east_west_strip() -> None:
-    done, strip, result = east_west_strip()
-    truth = done.truth.points.xyz[strip.formed.point]
-    along, found = corrected_in(strip.intermediate.azimuth, strip, result)
-    meridian, _ = corrected_in(0.0, strip, result)
-    assert found.axes[0].terms == CUBIC
-    assert rms(along - truth) < 0.1 * rms(strip.cartesian - truth)
-    assert rms(meridian - truth) > 30 * rms(along - truth)
 
 
 @pytest.mark.parametrize("heading", [0.0, 73.0, 90.0, 180.0, 271.0])
@@ -213,19 +140,6 @@ def test_flat_treatment_of_a_curved_earth_costs_metres(plane_map: tuple[Simulati
 
 
 @pytest.mark.slow
-def test_the_square_term_hides_most_of_the_curvature(plane_map: tuple[Simulation, Inputs, Floats]) -> None:
-    """The trap: residuals at control look fine, what is left across the strip and between does not show."""
-    _, inputs, _ = plane_map
-    hidden = height_rms(plane_map, degree("2"))
-    assert 0.01 < hidden < 0.5
-    found = triangulate(inputs, degree("2")).strips[0].polynomial
-    assert found is not None
-    along = np.ptp(found.reach) / 2
-    bulge = -found.axes[2].coefficients[found.axes[2].terms.index("X^2")] * along**2
-    assert abs(bulge) == pytest.approx(along**2 / (2 * 6_371_000.0), rel=0.02)  # the coefficient is the Earth's radius
-
-
-@pytest.mark.slow
 def test_the_correction_before_and_after_leaves_a_centimetre(plane_map: tuple[Simulation, Inputs, Floats]) -> None:
     """Theory: 0.008 m, from the mean radius instead of that in the direction of the strip."""
     model = height_rms(plane_map, replace(PLANE_MAP, adjustment="similarity"))
@@ -264,13 +178,6 @@ def test_curvature_twice_is_refused(crs: str, axes: tuple[str, str, str]) -> Non
         triangulate(inputs_of(done), PLANE_MAP)
     assert {fault.code for fault in caught.value.faults} == {"curvature-twice"}
     assert caught.value.exit_code == EXIT_INPUT
-
-
-def test_curvature_in_images_and_in_the_frame_is_refused() -> None:
-    done = simulate(Spec())
-    in_images = replace(SIMILARITY, refinement=replace(SIMILARITY.refinement, earth_radius=6_371_000.0))
-    with pytest.raises(InputError, match="counted twice: in the images and in EPSG:32633, which carries it"):
-        triangulate(inputs_of(done), in_images)
 
 
 # ---------------------------------------------------------------------------------------------- points seen once
@@ -319,99 +226,6 @@ def test_points_seen_once_are_listed_and_change_nothing() -> None:
     np.testing.assert_array_equal(
         before.strips[0].of_photos.resection.rotations, after.strips[0].of_photos.resection.rotations
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seen_on", [(2,), (3, 5)], ids=["one photo", "two photos that are not neighbours"])
-def test_control_without_coordinates_in_the_strip_does_not_take_part(seen_on: tuple[int, ...]) -> None:
-    done = simulate(Spec())
-    inputs = inputs_of(done)
-    photos = inputs.strips[0].photos
-    more = with_rows(inputs, [(photos[k], "lost", 3.0, -50.0) for k in seen_on])
-    far = ControlPoints(
-        (*inputs.control.ids, "lost"),
-        np.vstack([inputs.control.enu, inputs.control.enu[:1] + 5000.0]),
-        np.vstack([inputs.control.use, [[True, True, True]]]),
-        np.append(inputs.control.check, False),
-        np.vstack([inputs.control.sigma, inputs.control.sigma[:1]]),
-        np.append(inputs.control.frame, 0),
-    )
-    before, after = triangulate(inputs, Settings()), triangulate(replace(more, control=far), Settings())
-    assert list(after.not_determined) == ["lost"]
-    assert "lost" not in after.strips[0].control.ids
-    assert after.control_rows[-1] == -1
-    assert np.isnan(after.control_differences[-1]).all()
-    np.testing.assert_array_equal(before.points.cartesian, after.points.cartesian)
-
-
-def test_a_strip_whose_only_control_is_seen_once_is_refused() -> None:
-    done = simulate(Spec(control=Control(layout="corners")))
-    inputs = inputs_of(done)
-    seen = inputs.observations
-    _, first = np.unique(seen.point, return_index=True)
-    given = np.isin([seen.point_ids[n] for n in seen.point], done.control.ids)
-    keep = ~given | np.isin(np.arange(len(seen)), first)  # of given points the first measurement only
-    poor = replace(seen, photo=seen.photo[keep], point=seen.point[keep], xy=seen.xy[keep], sigma=seen.sigma[keep])
-    with pytest.raises(
-        GeometryError, match="strip A: neither control nor camera positions nor tie points connect"
-    ) as caught:
-        triangulate(replace(inputs, observations=poor), Settings())
-    assert caught.value.exit_code == EXIT_GEOMETRY
-
-
-# --------------------------------------------------------------------------------------- photos without control
-
-
-@pytest.mark.slow
-def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
-    """Control at both ends only: the photos between are oriented, exactly without errors and worse with them."""
-    spec = Spec(flight=Flight(photos=14), control=Control(layout="corners", noise=(0.0, 0.0, 0.0)))
-    done = simulate(spec)
-    control = {name for name, check in zip(done.control.ids, done.control.check, strict=True) if not check}
-    seen = done.observations
-    with_control = {
-        int(photo) for photo, point in zip(seen.photo, seen.point, strict=True) if seen.point_ids[point] in control
-    }
-    without = sorted(set(range(14)) - with_control)
-    assert len(without) >= 8
-    for sigma_um, low, high in ((0.0, 0.0, 1e-6), (5.0, 0.05, 5.0)):
-        noisy = simulate(replace(spec, image=Image(sigma_um=sigma_um)))
-        strip = triangulate(inputs_of(noisy), settings_of(noisy)).strips[0]
-        assert strip.of_photos.resection.solved.all()
-        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
-        error = np.linalg.norm(centers - noisy.truth.centers, axis=1)
-        assert low <= error[without].max() < high
-
-
-# -------------------------------------------------------------------------------- what polynomials are not made for
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_no_findings")
-def test_points_beyond_the_control_are_warned_of() -> None:
-    """Control in the first three fifths only: a cubic runs away where it is not held, and the report says so."""
-    squares: dict[str, list[float]] = {"similarity": [], "3": [], "inside": []}
-    for seed in range(1, 9):
-        done = simulate(Spec(seed=seed, flight=Flight(photos=21), control=Control(bands=6)))
-        inputs = inputs_of(done)
-        east = inputs.control.enu[:, 0]
-        kept = ~inputs.control.check & (east < east.min() + 0.7 * np.ptp(east))
-        short = replace(inputs, control=inputs.control.take(kept))
-        for name, asked in (("similarity", SIMILARITY), ("3", degree("3"))):
-            result = triangulate(short, asked)
-            end = result.points.ground[:, 0] > east[kept].max()
-            squares[name].append(rms(errors(done, result)[end]) ** 2)
-        squares["inside"].append(rms(errors(done, result)[~end]) ** 2)
-        assert "extrapolation" in codes(result)
-    assert "extrapolation" not in codes(triangulate(inputs, degree("3")))
-    assert np.mean(squares["3"]) > 1.5 * np.mean(squares["similarity"])
-    assert np.mean(squares["3"]) > 30 * np.mean(squares["inside"])
-
-
-@pytest.mark.parametrize(("photos", "warned"), [(26, False), (27, True)])
-def test_long_strips_are_warned_of(photos: int, warned: bool) -> None:
-    done = simulate(Spec(flight=Flight(photos=photos), control=Control(every=5)))
-    assert ("long-strip" in codes(triangulate(inputs_of(done), Settings("polynomial")))) == warned
 
 
 # ------------------------------------------------------------------------------------------ the base across the frame

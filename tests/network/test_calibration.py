@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Camera
-from photostrip.network.calibration import corrections
+from photostrip.network.adjustment import solve
 from photostrip.network.cofactors import cofactors_of
+from photostrip.network.observations import corrections
 from photostrip.network.settings import ASKED, CALIBRATION
-from photostrip.network.solve import solve
 from photostrip.simulation import Flight, Spec, simulate
 from tests.simulated_bundle import problem_of
 

@@ -35,11 +35,6 @@ def test_the_flight_goes_from_photo_to_photo_wherever_it_is() -> None:
     assert across == pytest.approx(np.cross(up, flight))
 
 
-def test_the_flight_of_one_photo_is_its_x_axis() -> None:
-    flight, _, _ = defects._flight_axes(state(flown(0.5)[:1], heading=1.2), np.arange(1))
-    assert flight == pytest.approx([np.cos(1.2), np.sin(1.2), 0.0])
-
-
 @pytest.mark.parametrize(
     ("degrees", "name"),
     [

@@ -8,22 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.cofactors import (
-    JointCofactors,
-    cofactors_of,
-    coordinates_of,
-    joint_cofactors,
-)
-from photostrip.network.problem import (
-    AttitudeObservations,
-    BundleProblem,
-    ControlObservations,
-    PositionObservations,
-)
-from photostrip.network.solve import solve
+from photostrip.network.adjustment import solve
+from photostrip.network.cofactors import JointCofactors, cofactors_of
+from photostrip.network.problem import AttitudeObservations, BundleProblem, ControlObservations, PositionObservations
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Points, Spec, simulate
 from tests.bundles import dense
@@ -34,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.network.solution import BundleSolution, Cofactors
+    from photostrip.network.adjustment import BundleSolution, Cofactors
     from tests.bundles import Dense
 
     Floats = NDArray[np.float64]
@@ -181,16 +170,6 @@ def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
     assert sum(every) + parts.sum() == pytest.approx(solution.redundancy, abs=1e-5)
 
 
-@pytest.mark.parametrize("problem", [strip(), with_everything()])
-def test_sums_of_coordinates_have_the_cofactors_of_the_joint_ones(problem: BundleProblem) -> None:
-    solution = solve(problem)
-    wanted = np.unique(problem.images.point)[::3]
-    factors = np.random.default_rng(2).standard_normal((len(wanted), 3, 2))
-    flat, coordinates = factors.reshape(-1, 2), coordinates_of(solution, wanted)
-    expected = flat.T @ joint_cofactors(solution, coordinates) @ flat
-    assert joint_cofactors(solution, csr_array(flat.T) @ coordinates) == pytest.approx(expected, rel=1e-9)
-
-
 @pytest.mark.parametrize("name", ["block", "everything"])
 def test_functions_of_photos_have_joint_cofactors(name: str) -> None:
     """Three functions of photos one beside the other, in any order: the photos' own cofactors carried over."""
@@ -210,15 +189,6 @@ def test_functions_of_photos_have_joint_cofactors(name: str) -> None:
         np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
 
 
-def test_a_rough_solution_has_the_cofactors_of_its_residuals() -> None:
-    problem = PROBLEMS["free"]()
-    exact, rough = solve(problem), solve(problem, rough=True)
-    found, expected = cofactors_of(rough), cofactors_of(exact)
-    np.testing.assert_allclose(found.image_residuals, expected.image_residuals, rtol=1e-4, atol=1e-9)
-    assert rough.equations is not None
-    assert exact.equations is None
-
-
 def test_thousands_of_photos_without_control_keep_their_redundancy_numbers() -> None:
     flight = Flight(photos=3000, scale=3000.0)
     simulation = simulate(Spec(flight=flight, control=SimulatedControl(every=1000, check=0)))
@@ -226,10 +196,3 @@ def test_thousands_of_photos_without_control_keep_their_redundancy_numbers() -> 
     images = solution.prepared.problem.images
     numbers = np.diagonal(cofactors_of(solution).image_residuals, axis1=1, axis2=2) / images.sigma**2
     assert numbers.sum() == pytest.approx(solution.redundancy, rel=2e-3)
-
-
-def test_nothing_but_the_datum_holds_a_strip_without_control() -> None:
-    simulation = simulate(Spec(flight=Flight(photos=60), points=Points(rows=2), control=SimulatedControl(per_band=2)))
-    problem = replace(problem_of(simulation, shift=0.01, turn=1e-5), control=ControlObservations())
-    found, expected = (cofactors_of(solve(problem, rough=rough)).image_residuals for rough in (True, False))
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8 * problem.images.sigma[0, 0] ** 2)

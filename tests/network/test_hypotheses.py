@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.network import hypotheses
-from photostrip.network.gross_errors import snooping
+from photostrip.network.adjustment import solve
 from photostrip.network.hypotheses import (
     DECENTRED,
     DISTANCE,
@@ -19,8 +19,6 @@ from photostrip.network.hypotheses import (
     LENS,
     LIST,
     OFFSET,
-    ORDER,
-    ORDERS,
     POINT,
     SCALE,
     SHIFT,
@@ -28,17 +26,14 @@ from photostrip.network.hypotheses import (
     most_likely,
 )
 from photostrip.network.problem import PositionObservations
-from photostrip.network.selection import Selection, supported
-from photostrip.network.settings import BundleSettings
-from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.loops import nonempty
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
+    from photostrip.network.adjustment import BundleSolution
     from photostrip.network.hypotheses import Hypothesis
     from photostrip.network.problem import BundleProblem
-    from photostrip.network.solution import BundleSolution
 
 
 def with_positions_and_lists() -> BundleProblem:
@@ -100,48 +95,6 @@ def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
         assert found.squares == pytest.approx(solution.chi_square - after.chi_square, rel=2e-3, abs=1e-3)
 
 
-def test_what_the_end_does_not_support_is_given_up_whatever_it_is() -> None:
-    """Positions had kept offsets and drifts, and control lists had stayed outside, that nothing spoke for any more."""
-    problem = with_positions_and_lists()
-    every, begun = Selection.everything(problem), solve(problem)
-    orders = [hypotheses.Hypothesis(ORDER, of=each) for each in ORDERS]
-    orders.append(hypotheses.Hypothesis(ORDER, of=hypotheses.EXCHANGED, pair=(1, 2)))
-    for each in (*nonempty(asked(begun)), *orders):
-        if each.kind == LIST:
-            each = replace(each, shift=(1.0,) * 3, sigma=(0.1,) * 3)  # noqa: PLW2901
-        search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
-        done = search.adjust(every)
-        search._take_up(each)
-        if each.kind != ORDER:  # wrong positions leave no adjustment
-            done = search.adjust(supported(search.problem, every))
-        left = search.put_back(done)
-        assert left is not None, each
-        if each.kind in hypotheses.PLAINER:
-            assert [kept.kind for kept in search.common] == [hypotheses.PLAINER[each.kind]]
-            left = search.put_back(search.clean(supported(search.problem, left)))
-            assert left is not None, each
-        assert search.common == []
-        assert left.given == every.given
-        again = search.clean(supported(search.problem, left))
-        assert again.solution.chi_square == pytest.approx(begun.chi_square, rel=1e-9)
-        assert again.solution.redundancy == begun.redundancy
-
-
-def test_of_what_explains_the_same_twice_one_is_given_up() -> None:
-    """A drift holds an offset: the offset is asked about once the drift has gone, and stays where it is there."""
-    problem = with_positions_and_lists()
-    moved_by = replace(problem.positions, xyz=problem.positions.xyz + np.array([0.0, 0.0, 1.5]))
-    problem = replace(problem, positions=moved_by)
-    every = Selection.everything(problem)
-    search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
-    for kind in (OFFSET, DRIFT):
-        search._take_up(hypotheses.Hypothesis(kind))
-    done = search.adjust(supported(search.problem, every))
-    while (left := search.put_back(done)) is not None:
-        done = search.clean(supported(search.problem, left))
-    assert [each.kind for each in search.common] == [OFFSET]
-
-
 def moved(problem: BundleProblem, number: int) -> float:
     """Fall of the sum of squares when a control list is moved to where it fits, found by a search."""
     control, solution = problem.control, solve(problem)
@@ -176,23 +129,3 @@ def test_of_hypotheses_that_explain_alike_the_first_is_taken_and_the_others_are_
     assert (likely.hypothesis.kind, likely.hypothesis.rivals) == (OFFSET, (DISTANCE,))
     found[1] = Likely.of(second, 520.0, 1, 3)
     assert most_likely(found, 0.01).hypothesis == second
-
-
-@pytest.mark.parametrize(
-    ("kind", "values", "cannot_be"),
-    [
-        (POINT, (0.9, 0.0), False),
-        (POINT, (1.1, 0.0), True),
-        (POINT, (0.0, -1.1), True),
-        (DISTANCE, (-0.9,), False),
-        (DISTANCE, (-1.1,), True),
-    ],
-)
-def test_no_camera_looks_upwards_or_lies_beside_its_photo(
-    kind: str, values: tuple[float, ...], *, cannot_be: bool
-) -> None:
-    """Of the measured part of a photo, or of the principal distance, so much."""
-    problem = hypotheses.taken_up(with_positions_and_lists(), hypotheses.Hypothesis(kind, 0))
-    whole = problem.cameras.focal[0] if kind == DISTANCE else np.abs(problem.images.xy).max()
-    solution = replace(solve(problem), common=whole * np.array(values))
-    assert hypotheses.impossible(solution) == cannot_be

@@ -10,8 +10,8 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from photostrip.network.adjustment import solve
 from photostrip.network.cofactors import cofactors_of
-from photostrip.network.solve import solve
 from tests.peer import FILE, SHAPES, problem
 from tests.source_tree import ROOT
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import pytest
 
-from photostrip.network import robust
+from photostrip.network import adjustment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def test_rays_keep_their_weight_up_to_three_times_the_scale(monkeypatch: pytest.
     median = np.sqrt(2 * np.log(2.0))  # of the length of two standard normal residuals
     size = median * np.array([0.5, 0.5, 0.6, 0.7, 1.0, 1.5, 2.5, 6.0 / median, 4.5 / median])
     residuals = np.column_stack([size, np.zeros(9)]) * sigma
-    monkeypatch.setattr(robust, "solve", lambda _: SimpleNamespace(image_residuals=residuals))
-    monkeypatch.setattr(robust, "restarted", lambda problem, _: problem)
-    _, weight = robust.adjust_robustly(cast("BundleProblem", Problem(Images(sigma))))
+    monkeypatch.setattr(adjustment, "solve", lambda _: SimpleNamespace(image_residuals=residuals))
+    monkeypatch.setattr(adjustment, "restarted", lambda problem, _: problem)
+    _, weight = adjustment.adjust_robustly(cast("BundleProblem", Problem(Images(sigma))))
     assert weight == pytest.approx([1.0] * 7 + [np.exp(-3.0), np.exp(1 - 1.5**2)], rel=1e-3)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from photostrip.network.adjustment import solve
 from photostrip.network.cofactors import cofactors_of
-from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
 from tests.draws import orthogonal_normal
 from tests.simulated_bundle import problem_of, truth_of

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from photostrip.network.reliability import SIGMA0_LEVEL, sigma0_test
 
 if TYPE_CHECKING:
-    from photostrip.network.solution import BundleSolution
+    from photostrip.network.adjustment import BundleSolution
 
 
 def solution(redundancy: int) -> BundleSolution:

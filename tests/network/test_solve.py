@@ -8,24 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.problem import (
-    BundleCameras,
-    BundleProblem,
-    ControlObservations,
-    ImageObservations,
-    PositionObservations,
-    StartValues,
-)
-from photostrip.network.solution import IterationStep
-from photostrip.network.solve import _still_to_come, solve
+from photostrip.network.adjustment import solve
+from photostrip.network.problem import BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Image, Points, Spec, simulate
-from tests.attitudes import angle_between
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
@@ -34,7 +23,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MICROMETRE = 1e-6  # metres on the ground
-NANORADIAN = 1e-9
 
 
 @cache
@@ -53,67 +41,6 @@ def simulated(
     return problem_of(simulation), truth_of(simulation)
 
 
-def seen_points(problem: BundleProblem) -> NDArray[np.bool_]:
-    """Points with rays."""
-    return np.bincount(problem.images.point, minlength=problem.points) > 0
-
-
-@pytest.mark.parametrize(("photos", "strips"), [(2, 1), (12, 1), (20, 5)])
-def test_without_noise_the_truth_comes_back(photos: int, strips: int) -> None:
-    problem, truth = simulated(photos, strips, 0.0, 0.0)
-    solution = solve(problem)
-    seen = seen_points(problem)
-    assert np.abs(solution.points - truth.points)[seen].max() < MICROMETRE
-    assert np.abs(solution.centers - truth.centers).max() < 2 * MICROMETRE
-    assert angle_between(solution.rotations, truth.rotations).max() < NANORADIAN
-    assert np.abs(solution.image_residuals).max() < 1e-8
-    assert np.abs(problem.start.points - truth.points)[seen].max() > 1.0
-    assert len(solution.steps) <= 4
-
-
-def test_the_order_of_rays_and_photos_does_not_matter() -> None:
-    problem, _ = simulated(12, 3)
-    solution = solve(problem)
-    random = np.random.default_rng(1)
-    rows, photos = random.permutation(len(problem.images)), random.permutation(problem.photos)
-    number = np.argsort(photos)
-    images, start = problem.images, problem.start
-    shuffled = replace(
-        problem,
-        images=ImageObservations(number[images.photo[rows]], images.point[rows], images.xy[rows], images.sigma[rows]),
-        cameras=replace(problem.cameras, of_photo=problem.cameras.of_photo[photos]),
-        start=replace(start, centers=start.centers[photos], rotations=start.rotations[photos]),
-    )
-    other = solve(shuffled)
-    np.testing.assert_allclose(other.points, solution.points, atol=MICROMETRE)
-    np.testing.assert_allclose(other.centers, solution.centers[photos], atol=MICROMETRE)
-    np.testing.assert_allclose(other.image_residuals, solution.image_residuals[rows], atol=1e-9)
-    assert other.chi_square == pytest.approx(solution.chi_square, rel=1e-9)
-
-
-@pytest.mark.slow
-@settings(max_examples=8, deadline=None)
-@given(st.integers(0, 1000), st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.5, 2.0))
-def test_turning_the_frame_turns_the_result(seed: int, vector: list[float], scale: float) -> None:
-    problem, _ = simulated(6, 1)
-    random = np.random.default_rng(seed)
-    turn, shift = from_vector(np.array(vector)), random.normal(0.0, 1000.0, 3)
-
-    def moved(xyz: Floats) -> Floats:
-        return scale * xyz @ turn.T + shift
-
-    control, start = problem.control, problem.start
-    other = replace(
-        problem,
-        start=StartValues(moved(start.centers), turn @ start.rotations, moved(start.points)),
-        control=ControlObservations(control.point, moved(control.xyz), control.axes @ turn.T, scale * control.sigma),
-    )
-    first, second = solve(problem), solve(other)
-    np.testing.assert_allclose(second.points, moved(first.points), atol=10 * MICROMETRE)
-    np.testing.assert_allclose(second.image_residuals, first.image_residuals, atol=1e-8)
-    assert second.chi_square == pytest.approx(first.chi_square, rel=1e-7)
-
-
 @pytest.mark.parametrize("shift", [10.0, 50.0, 200.0])
 def test_poor_starts_end_at_the_same_place(shift: float) -> None:
     problem, truth = simulated(8, 1)
@@ -127,74 +54,6 @@ def test_poor_starts_end_at_the_same_place(shift: float) -> None:
     np.testing.assert_allclose(found.points, expected.points, atol=10 * MICROMETRE)
     falls = [step.chi_square for step in found.steps if step.damping == 0.0]
     assert falls[-1] <= falls[0]
-
-
-def test_a_free_network_keeps_the_place_of_its_points() -> None:
-    problem, truth = simulated(8, 1, 0.0, 0.0)
-    free = solve(replace(problem, control=ControlObservations()))
-    seen = seen_points(problem)
-    moved = (free.points - problem.start.points)[seen]
-    arm = (free.points - free.points[seen].mean(axis=0))[seen]
-    size = np.abs(arm).max()
-    assert free.free
-    assert np.abs(moved.mean(axis=0)).max() < 1e-3  # of second order in the steps of some metres
-    assert np.abs(np.cross(arm, moved).mean(axis=0)).max() / size < 1e-3
-    assert abs((arm * moved).sum(axis=1).mean()) / size < 2e-3
-    # The shape is that of the truth.
-    one, other = free.points[seen], truth.points[seen]
-    lengths = np.linalg.norm(one[1:] - one[:-1], axis=1) / np.linalg.norm(other[1:] - other[:-1], axis=1)
-    assert np.ptp(lengths) < 1e-9
-
-
-def test_positions_with_lever_arm_offset_and_drift_replace_control() -> None:
-    problem, truth = simulated(10, 2, 0.0, 0.0)
-    m = problem.photos
-    time = np.tile(np.arange(-4.5, 5.0), 2)
-    lever = np.tile([0.3, -0.2, 1.5], (m, 1))
-    axes = np.tile(problem.control.axes[0], (m, 1, 1))
-    group = np.repeat([0, 1], 10)
-    offset, drift = np.array([[2.0, -1.0, 0.5], [0.0, 3.0, -2.0]]), np.array([[0.1, 0.0, -0.2], [0.0, 0.0, 0.0]])
-    antenna = truth.centers + np.einsum("nij,nj->ni", truth.rotations, lever)
-    wrong = -np.einsum("nij,ni->nj", axes, offset[group] + drift[group] * time[:, None])
-    positions = PositionObservations(
-        photo=np.arange(m),
-        xyz=antenna + wrong,
-        axes=axes,
-        sigma=np.full((m, 3), 0.05),
-        lever=lever,
-        group=group,
-        time=time,
-        offset_sigma=np.full((2, 3), np.inf),
-        drift_sigma=np.array([[np.inf] * 3, [0.0] * 3]),
-    )
-    solution = solve(replace(problem, positions=positions, control=_some(problem, 4)))
-    np.testing.assert_allclose(solution.common, np.concatenate([offset.ravel(), drift[0]]), atol=1e-5)
-    assert np.abs(solution.points - truth.points)[seen_points(problem)].max() < 10 * MICROMETRE
-    names = replace(problem, positions=positions, group_ids=("A", "B")).common_names()
-    assert names[:2] == ("positions A: offset east", "positions A: offset north")
-    assert names[-1] == "positions A: drift up"
-
-
-def test_the_camera_comes_out_of_the_measurements() -> None:
-    problem, truth = simulated(10, 3, 0.0, 0.0)
-    x, y = problem.images.xy.T
-    r2 = x**2 + y**2
-    k1, x0 = 2e-8, 0.03
-    given_xy = np.column_stack([x - k1 * x * r2 + x0, y - k1 * y * r2])
-    sigma = np.zeros((1, 10))
-    sigma[0, [1, 2, 3]] = np.inf
-    wrong = replace(
-        problem,
-        images=replace(problem.images, xy=given_xy),
-        cameras=replace(problem.cameras, sigma=sigma),
-        camera_ids=("RC30",),
-    )
-    solution = solve(wrong)
-    assert wrong.common_names() == ("camera RC30: x0", "camera RC30: y0", "camera RC30: k1")
-    assert solution.common[0] == pytest.approx(x0, abs=2e-4)
-    assert solution.common[2] == pytest.approx(k1, rel=2e-3)
-    assert np.abs(solution.points - truth.points)[seen_points(problem)].max() < 0.01
-    assert np.abs(solve(replace(wrong, cameras=problem.cameras)).points - truth.points).max() > 0.05
 
 
 # ------------------------------------------------------------------------------------------ what is not determined
@@ -255,74 +114,6 @@ def test_a_photo_with_too_few_points_is_named() -> None:
     assert caught.value.code == "bundle-rank"
 
 
-def test_a_part_without_control_is_named() -> None:
-    problem, _ = simulated(8, 1)
-    left = problem.images.photo < 4
-    of_left = np.bincount(problem.images.point[left], minlength=problem.points) > 0
-    of_right = np.bincount(problem.images.point[~left], minlength=problem.points) > 0
-    apart = _without(problem, (of_left & of_right)[problem.images.point])
-    control = problem.control
-    rows = np.flatnonzero(~of_right[control.point])
-    given_left = ControlObservations(control.point[rows], control.xyz[rows], control.axes[rows], control.sigma[rows])
-    with pytest.raises(GeometryError, match=r"of photos .*: no control and no camera positions") as caught:
-        solve(replace(apart, control=given_left))
-    assert caught.value.photos == tuple(problem.photo_name(n) for n in range(4, 8))
-
-
-def test_points_that_rays_do_not_determine_are_named() -> None:
-    problem, _ = simulated(6, 1)
-    two = np.flatnonzero(np.bincount(problem.images.point, minlength=problem.points) == 2)
-    two = two[~np.isin(two, problem.control.point)][:2]
-    keep = np.ones(len(problem.images), bool)
-    keep[[np.flatnonzero(problem.images.point == point)[0] for point in two]] = False
-    images = problem.images
-    lame = ImageObservations(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep])
-    with pytest.raises(GeometryError) as caught:
-        solve(replace(problem, images=lame))
-    assert set(caught.value.points) == {problem.point_name(int(point)) for point in two}
-    assert caught.value.code == "bundle-rays"
-
-
-def test_a_point_with_one_ray_and_a_given_height_is_adjusted() -> None:
-    problem, truth = simulated(6, 1, 0.0, 0.0)
-    two = np.flatnonzero(np.bincount(problem.images.point, minlength=problem.points) == 2)
-    point = two[~np.isin(two, problem.control.point)][0]
-    keep = np.ones(len(problem.images), bool)
-    keep[np.flatnonzero(problem.images.point == point)[0]] = False
-    images, control = problem.images, problem.control
-    lame = replace(
-        problem,
-        images=ImageObservations(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep]),
-        control=ControlObservations(
-            np.append(control.point, point),
-            np.concatenate([control.xyz, truth.points[[point]]]),
-            np.concatenate([control.axes, control.axes[:1]]),
-            np.concatenate([control.sigma, [[np.inf, np.inf, 0.05]]]),
-        ),
-    )
-    assert np.abs(solve(lame).points[point] - truth.points[point]).max() < 10 * MICROMETRE
-
-
-def test_a_ray_that_stands_twice_is_refused() -> None:
-    problem, _ = simulated(6, 1)
-    images = problem.images
-    twice = ImageObservations(
-        *(np.concatenate([part, part[:1]]) for part in (images.photo, images.point, images.xy, images.sigma))
-    )
-    with pytest.raises(InputError, match="is measured twice on photo") as caught:
-        solve(replace(problem, images=twice))
-    assert caught.value.faults[0].code == "bundle-repeated"
-
-
-def test_parameters_of_a_camera_that_cannot_be_told_apart_are_named() -> None:
-    problem, _ = simulated(6, 1)
-    sigma = np.zeros((2, 10))
-    sigma[:, 0] = np.inf
-    unused = BundleCameras(problem.cameras.of_photo, np.repeat(problem.cameras.focal, 2), sigma)
-    with pytest.raises(GeometryError, match="do not determine camera second: c: hold one of them"):
-        solve(replace(problem, cameras=unused, camera_ids=("first", "second")))
-
-
 @pytest.mark.parametrize(
     ("breadth", "off", "words"),
     [
@@ -350,7 +141,7 @@ def test_steps_without_end_say_what_is_wrong_with_the_control(
         along = np.outer(middle @ axis, axis)
         xyz = xyz.mean(axis=0) + along + breadth * (middle - along)
     xyz[0, 0] += off
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=words) as caught:
         solve(replace(problem, control=replace(problem.control, xyz=xyz)))
     assert caught.value.code == "bundle-diverged"
@@ -358,16 +149,7 @@ def test_steps_without_end_say_what_is_wrong_with_the_control(
 
 def test_steps_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = simulated(6, 1)
-    monkeypatch.setattr("photostrip.network.solve.MOST_STEPS", 1)
+    monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=r"did not converge in 1 step$") as caught:
         solve(problem)
     assert caught.value.code == "bundle-diverged"
-
-
-@pytest.mark.parametrize(
-    ("lengths", "next_length"),
-    [([1e-3, 1e-5], 1e-7), ([1e-5, 1e-3], 1e-3), ([0.2], 0.04), ([0.0, 0.0], 0.0), ([0.0, 0.1], 0.1)],
-)
-def test_the_next_step_shrinks_as_the_last_did(lengths: list[float], next_length: float) -> None:
-    steps = [IterationStep(chi_square=1.0, length=each, damping=0.0, shift=0.0, turn=0.0) for each in lengths]
-    assert _still_to_come(steps) == pytest.approx(next_length, rel=1e-12)

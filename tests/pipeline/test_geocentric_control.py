@@ -13,7 +13,6 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
-from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Spec, simulate
 from tests.simulated import inputs_of, settings_of
 
@@ -57,22 +56,6 @@ def test_misclosures_are_east_north_and_up(both: tuple[Result, Result]) -> None:
     np.testing.assert_allclose(second, first, rtol=0, atol=MILLIMETRE)
     up = [r.strips[0].absolute.misclosures[:, 2] for r in both]
     np.testing.assert_allclose(up[1], up[0], rtol=0, atol=MILLIMETRE)
-
-
-def test_the_expected_size_of_a_difference_follows_the_axes(both: tuple[Result, Result]) -> None:
-    plan, height = both[0].strips[0].precision
-    fit = [document_of(both[1])["control"][0][f"sigma_fit_{k}"] for k in (1, 2, 3)]
-    assert fit[0] == pytest.approx(np.hypot(SIGMA[0], height), rel=0.1)  # X is nearly up at 5 degrees of latitude
-    assert fit[2] == pytest.approx(np.hypot(SIGMA[2], plan), rel=0.1)
-
-
-def test_part_of_a_geocentric_point_is_refused(both: tuple[Result, Result]) -> None:
-    inputs = both[1].inputs
-    use = inputs.control.use.copy()
-    use[0, 2] = False
-    with pytest.raises(InputError, match="is geocentric, and only some of its coordinates count") as caught:
-        triangulate(replace(inputs, control=replace(inputs.control, use=use)), both[1].settings)
-    assert caught.value.faults[0].code == "geocentric-use"
 
 
 @pytest.mark.parametrize("counted", [(True, False, True), (False, True, False)])

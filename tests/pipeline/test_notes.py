@@ -18,7 +18,7 @@ from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, Strip
-    from photostrip.strip.polynomial.correction import Polynomial
+    from photostrip.strip.polynomial import Polynomial
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.strip.relative_orientation.orientation import RelativeSettings as Relative
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.strips import Flown, control_points, fly, project
 
 WRONG = ("105", "p4_1")
@@ -43,12 +42,6 @@ def in_use(result: Result, photo: str, point: str) -> bool:
     return bool((oriented.used & (oriented.rows == row).any(axis=1)).any())
 
 
-def test_a_wrong_measurement_is_rejected_by_itself() -> None:
-    result = adjusted()
-    assert not in_use(result, *WRONG)
-    assert not [note for note in result.notes if note.code.startswith("user-")]
-
-
 @pytest.mark.slow
 def test_a_measurement_that_is_kept_stays_in_use_and_is_reported() -> None:
     result = adjusted(keep=("105/p4_1",))
@@ -67,15 +60,6 @@ def test_a_measurement_that_is_dropped_takes_no_part_and_is_reported() -> None:
     result = adjusted(drop=("103/p2_0",))
     assert not in_use(result, "103", "p2_0")
     assert [note.code for note in result.notes if note.code.startswith("user-")] == ["user-drop"]
-
-
-def test_a_weight_of_a_point_that_no_photo_shows_is_refused() -> None:
-    strip = spoiled()
-    inputs = project(strip, control_points({name: strip.xyz[strip.at[name]] for name in strip.bands(0, 3, 6)}))
-    formation = StripFormationSettings(scale_weights={"p2_0": 2.0, "nobody": 1.0})
-    with pytest.raises(InputError, match="`nobody` is no point of the photos") as told:
-        triangulate(inputs, Settings(formation=formation))
-    assert [fault.key for fault in told.value.faults] == ["processing.scale_weights"]
 
 
 @pytest.mark.parametrize(

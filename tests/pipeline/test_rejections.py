@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
@@ -14,20 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.cli.main import main
 from photostrip.formats.output.result_files import csv_pieces
-from photostrip.formats.output.simulation import project_files
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Points, Spec
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation.simulation import Simulation
 
@@ -131,18 +123,3 @@ def test_names_do_not_decide() -> None:
         {key: value for key, value in row.items() if key != "reason"} for row in rows(rejected(inputs_of(flown())))
     ]
     assert sorted(found, key=repr) == sorted(expected, key=repr)
-
-
-@pytest.mark.slow
-def test_threads_do_not_decide(tmp_path: Path) -> None:
-    for name, text in project_files(flown()).items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    command = ["run", str(tmp_path / "project.yaml"), "-q", "-o"]
-    assert main([*command, str(tmp_path / "one")]) == 0  # with one thread, as all tests
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"}
-    two = [sys.executable, "-m", "photostrip", *command, str(tmp_path / "two")]
-    done = subprocess.run(two, env=environment, capture_output=True, check=False)
-    assert done.returncode == 0, done.stderr
-    tables = [(tmp_path / out / "rejected.csv").read_bytes() for out in ("one", "two")]
-    assert tables[0] == tables[1]
-    assert len(tables[0].splitlines()) > 10

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import parallax_error
-from photostrip.strip.relative_orientation import six_points
+from photostrip.planning.deformation import parallax_error
+from photostrip.strip.relative_orientation import standard_points
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.planning.model.single_model import ModelControl
+    from photostrip.planning.single_model import ModelControl
 
     Array = NDArray[np.float64]
 
@@ -131,4 +131,4 @@ def orientation_factors(xy: ArrayLike, focal: float, width: float, base: float) 
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    return np.asarray(np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows), float)
+    return np.asarray(np.einsum("...i,ij,...j->...", rows, standard_points.cofactors(focal, width, base), rows), float)

@@ -7,17 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.camera import Distortion
-from photostrip.errors import InputError
 from photostrip.planning.camera_efficiency import (
     PRINTED_BASE,
     PRINTED_TABLE,
     ComparedCamera,
     FlownSurvey,
     HighGround,
-    by_efficiency,
     compare,
-    sigma_from_distortion,
     sigma_from_mean_distortion,
     source_cameras,
     suitability,
@@ -41,34 +37,10 @@ def test_numbers_computed_apart(vector: Vector) -> None:
     assert [camera.height_ratio for camera in cameras] == pytest.approx(want["H_over_mh"], rel=1e-12)
 
 
-@pytest.mark.parametrize("vector", cases("camera_efficiency", "camera-efficiency-general"))
-def test_other_formats(vector: Vector) -> None:
-    x = vector.input
-    first, second = (ComparedCamera("", x[f"f{k}"], x[f"mp{k}"], x[f"b{k}"], x[f"l{k}"]) for k in (1, 2))
-    found = compare(first, second)
-    assert found.printed_area == pytest.approx(vector.expected["as_printed"], rel=1e-12)
-    assert found.area == pytest.approx(vector.expected["true_area_ratio"], rel=1e-12)
-
-
 def flown(camera: ComparedCamera, m_h: float) -> float:
     """Ground area of a model, flown as high as a standard deviation of heights allows: m_h = H m_p / b."""
     scale = m_h * camera.base / camera.sigma / camera.focal
     return camera.base * scale * camera.width * scale
-
-
-def test_the_area_needs_the_scale_squared() -> None:
-    first, second = ComparedCamera("a", 70, 0.017, 60, 130), ComparedCamera("b", 200, 0.011, 75, 160)
-    found = compare(first, second)
-    assert flown(first, 0.2) / flown(second, 0.2) == pytest.approx(found.area)
-    assert abs(found.printed_area / found.area - 1) > 0.3  # eq. 2 as printed is no ratio of areas
-    assert found.photos * found.area == pytest.approx(1)
-
-
-def test_height_errors_at_equal_area() -> None:
-    first, second = ComparedCamera("a", 70, 0.017, 60, 130), ComparedCamera("b", 200, 0.011, 75, 160)
-    # m_h in proportion to the scale; the area to its square
-    m_h = [1.0 / np.sqrt(flown(camera, 1.0)) for camera in (first, second)]
-    assert compare(first, second).height_error == pytest.approx(m_h[0] / m_h[1])
 
 
 def test_the_printed_table_and_its_misprints() -> None:
@@ -91,31 +63,6 @@ def test_the_printed_table_and_its_misprints() -> None:
     assert PRINTED_BASE == 60
 
 
-def test_eq_5_as_printed_contradicts_the_definition() -> None:
-    # printed with garbled indices; H1 m_p1 b2 / (b1 H2 m_p2) is what m_h = H m_p / b says
-    first, second, heights = (
-        ComparedCamera("a", 70, 0.017, 60, 130),
-        ComparedCamera("b", 200, 0.011, 75, 130),
-        (900.0, 1500.0),
-    )
-    m_h = [h * c.sigma / c.base for h, c in zip(heights, (first, second), strict=True)]
-    assert m_h[0] / m_h[1] == pytest.approx(
-        heights[0] * first.sigma * second.base / (first.base * heights[1] * second.sigma)
-    )
-
-
-def test_the_best_camera_is_that_of_the_largest_area_at_equal_heights() -> None:
-    cameras = [
-        ComparedCamera("a", 70, 0.017, 60, 130),
-        ComparedCamera("b", 200, 0.011, 75, 160),
-        ComparedCamera("c", 150, 0.003, 92, 230),
-    ]
-    assert [c.name for c in by_efficiency(cameras)] == sorted(
-        "abc", key=lambda name: -flown(next(c for c in cameras if c.name == name), 1.0)
-    )
-    assert [c.focal for c in by_efficiency(source_cameras())] == [70, 100, 140, 200]
-
-
 # --------------------------------------------------------------------------------- distortion, ground and what it costs
 
 FILM = ComparedCamera("film", focal=153.0, sigma=0.007, base=92.0, width=161.0, length=230.0)
@@ -130,33 +77,6 @@ def test_a_parallax_from_measuring_and_mean_distortion_scatters_so() -> None:
     found = sigma_from_mean_distortion(measuring, float(np.abs(radial).mean()))
     assert (x[:, 0] - x[:, 1]).std() == pytest.approx(found, rel=0.01)
     assert sigma_from_mean_distortion(measuring, 0.0) == pytest.approx(np.sqrt(2) * measuring)
-
-
-def test_a_parallax_with_a_known_distortion_is_its_scatter_over_the_model() -> None:
-    k1, base, length, width = 4e-9, 92.0, 230.0, 161.0
-    rng = np.random.default_rng(8)
-    x, y = rng.uniform(base - length / 2, length / 2, 400_000), rng.uniform(-width / 2, width / 2, 400_000)
-    parallax = k1 * (x * (x**2 + y**2) - (x - base) * ((x - base) ** 2 + y**2))
-    brown = Distortion("brown", "image_to_ideal", k=(k1, 0.0, 0.0))
-    found = sigma_from_distortion(0.0, brown, base, length, width)
-    assert found == pytest.approx(parallax.std(), rel=0.06)  # a grid reaches the edges, drawn points hardly do
-    measured = sigma_from_distortion(0.003, brown, base, length, width)
-    assert measured == pytest.approx(np.hypot(found, 0.003 * np.sqrt(2)))
-    short = Distortion("radial-table", "image_to_ideal", radius=(0.0, 60.0), distortion=(0.0, 0.002))
-    with pytest.raises(InputError, match="beyond the distortion table"):
-        sigma_from_distortion(0.0, short, base, length, width)
-
-
-@pytest.mark.parametrize(
-    "survey", [FlownSurvey(scale=8000), FlownSurvey(flying_height=1224), FlownSurvey(height_sigma=0.0931304)]
-)
-def test_what_a_height_and_an_area_cost(survey: FlownSurvey) -> None:
-    flown = survey.flown(FILM)
-    # m_h = H m_p / b: a height at the distance H from a base of b m, of which a parallax is known to m_p m
-    assert flown.scale == pytest.approx(8000, rel=1e-5)
-    assert flown.flying_height == pytest.approx(1224, rel=1e-5)
-    assert flown.height_sigma == pytest.approx(1224 * 0.007 / 92, rel=1e-5)
-    assert flown.area == pytest.approx(0.736 * 1.288, rel=1e-5)
 
 
 def photos_of(place: float, height: float, flying_height: float, camera: ComparedCamera) -> int:
@@ -179,28 +99,3 @@ def test_the_largest_relief_is_where_no_point_is_left_on_three_photos() -> None:
     assert found.lap == pytest.approx(overlap)
     assert found.suits
     assert not suitability(FILM, FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))).suits
-
-
-def test_the_steepest_slope_is_that_which_the_outermost_ray_grazes() -> None:
-    steepest = suitability(FILM, FlownSurvey(scale=8000)).slope
-    ray = np.array([92.0, 80.5, -153.0])  # from the left photo to the corner of the model beside the right nadir
-    away = np.append(ray[:2] / np.hypot(*ray[:2]), 0.0)
-    for change, seen in ((-1e-3, True), (1e-3, False)):
-        slope = steepest + change
-        normal = np.array([0.0, 0.0, np.cos(slope)]) + away * np.sin(slope)  # a slope that falls away from the photo
-        assert (ray @ normal < 0) is np.bool_(seen)
-
-
-def test_the_least_principal_distance_just_takes_the_terrain() -> None:
-    for terrain in (
-        HighGround(relief=500.0),
-        HighGround(slope=np.radians(55.0)),
-        HighGround(relief=300.0, slope=np.radians(40)),
-    ):
-        survey = FlownSurvey(scale=8000.0, terrain=terrain)
-        least = suitability(FILM, survey).least_focal
-        assert suitability(FILM._replace(focal=least * 1.0001), survey).suits
-        assert not suitability(FILM._replace(focal=least * 0.9999), survey).suits
-    # at a given flying height the principal distance does not change what relief asks for
-    too_much = FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))
-    assert suitability(FILM, too_much).least_focal == np.inf

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from photostrip.errors import GeometryError, InputError
 from photostrip.planning.screening import (
     PairLayout,
     ScreeningSpec,
@@ -78,21 +75,3 @@ def test_without_a_search_every_error_stays_and_turns_its_pair() -> None:
     turned = orient_unchecked(spoiled(pairs, errors))[0].elements - orient_unchecked(pairs)[0].elements
     change = np.abs(turned).max(axis=1)
     assert [found.mean_change, found.worst_change] == pytest.approx([change.mean(), change.max()])
-
-
-@pytest.mark.slow
-def test_every_error_is_counted_once() -> None:
-    outcome = screening_experiment(ScreeningSpec(methods=("parallax+grubbs", "auto"), repetitions=3))
-    for method in nonempty(outcome.methods):
-        assert sum(each.errors for each in method.detection) == 3 * 44
-        found = sum(each.found for each in method.detection) / (3 * 44)
-        assert found == pytest.approx(1 - method.missed) == pytest.approx(method.parallax + method.later)
-    by_auto = outcome.methods[1]
-    assert by_auto.missed < outcome.methods[0].missed
-
-
-@pytest.mark.parametrize(("counts", "error"), [((1, 1, 1, 1, 1, 0), InputError), ((5, 5, 0, 0, 0, 0), GeometryError)])
-def test_zones_that_carry_no_experiment_are_refused(counts: tuple[int, ...], error: type[Exception]) -> None:
-    layout = replace(PairLayout(), counts=counts, scatter=0.0, relief=0.0, tilt=0.0)
-    with pytest.raises(error):
-        screening_experiment(ScreeningSpec(layout=layout, repetitions=1))

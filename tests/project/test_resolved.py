@@ -30,12 +30,12 @@ cameras:
       b: [0.0, 0.0]
       k0: 0.0
 strips:
-  - id: "A"
-    camera: "RC30"
-    photos: ["1001", "1002"]
-  - id: "B"
-    camera: "RC30"
-    photos: ["2001", "2002"]
+- id: "A"
+  camera: "RC30"
+  photos: ["1001", "1002"]
+- id: "B"
+  camera: "RC30"
+  photos: ["2001", "2002"]
 observations:
   file: "observations.csv"
   separator: comma
@@ -46,14 +46,14 @@ observations:
   origin: center
   sigma: 0.005
 control:
-  - file: "control.csv"
-    separator: comma
-    decimal: point
-    skip: 0
-    crs: "EPSG:32633"
-    axes: [east, north, up]
-    height: ellipsoidal
-    sigma: [0.05, 0.06, 0.08]
+- file: "control.csv"
+  separator: comma
+  decimal: point
+  skip: 0
+  crs: "EPSG:32633"
+  axes: [east, north, up]
+  height: ellipsoidal
+  sigma: [0.05, 0.06, 0.08]
 output:
   crs: "EPSG:32633"
   axes: [east, north, up]

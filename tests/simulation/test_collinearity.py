@@ -9,7 +9,7 @@ import pytest
 from pyproj import CRS, Proj, Transformer
 
 from photostrip.camera import Distortion
-from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
+from photostrip.simulation import FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
 from tests.attitudes import rotation_x, rotation_y, rotation_z
 
 NANOMETRE = 1e-6  # mm
@@ -144,14 +144,6 @@ def test_distortion_is_the_formula_of_the_project_file(direction: str) -> None:
     assert np.abs((ideal - image if direction == "image_to_ideal" else image - ideal) - D).max() < NANOMETRE
 
 
-def test_a_digital_camera_has_its_own_format() -> None:
-    done = simulate(replace(FREE, camera=DIGITAL, flight=Flight(photos=20)))
-    width, height = DIGITAL.format or (0.0, 0.0)
-    x, y = np.abs(done.observations.xy).max(axis=0)
-    assert width / 2 * 0.8 < x <= width / 2
-    assert height / 2 * 0.7 < y <= height / 2
-
-
 @pytest.mark.parametrize("crs", ["local", "EPSG:32633"])
 def test_refraction_moves_images_away_from_the_nadir(crs: str) -> None:
     spec = replace(
@@ -172,25 +164,3 @@ def test_refraction_moves_images_away_from_the_nadir(crs: str) -> None:
         < 1e-5
     )
     assert outward.max() > 0.01
-
-
-def test_refraction_follows_the_vertical_when_the_photo_is_tilted() -> None:
-    spec = replace(
-        FREE,
-        ground=Ground(crs="local"),
-        flight=Flight(scale=40_000.0, end_lap_percent=70.0, attitude_sigma_deg=(4.0, 4.0, 4.0)),
-    )
-    straight, bent = simulate(spec), simulate(replace(spec, refraction=True))
-    photo, f = straight.observations.photo, 153.0
-    rays = [
-        np.einsum(
-            "nij,nj->ni", done.truth.rotations[photo], np.column_stack([done.truth.image, np.full(len(photo), -f)])
-        )
-        for done in (straight, bent)
-    ]
-    azimuth = [np.arctan2(ray[:, 1], ray[:, 0]) for ray in rays]
-    assert np.abs(np.sin(azimuth[0] - azimuth[1])).max() < 1e-9
-    tangent = [np.hypot(ray[:, 0], ray[:, 1]) / -ray[:, 2] for ray in rays]
-    gained = tangent[1] / tangent[0] - 1.0
-    assert (gained > 0.0).all()
-    assert gained / (1.0 + tangent[0] ** 2) == pytest.approx(gained.mean() / (1.0 + tangent[0] ** 2).mean(), rel=0.05)

@@ -12,7 +12,7 @@ from scipy import stats
 from photostrip.errors import InputError
 from photostrip.points import locate
 from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec, simulate
-from photostrip.simulation.control import band_photos
+from photostrip.simulation.placement import band_photos
 from tests.loops import nonempty
 
 NONE = (0.0, 0.0, 0.0)
@@ -52,13 +52,6 @@ def test_bands(photos: int, bands: int, every: int | None, expected: list[int]) 
     assert all(station in seen[3 * k + i] for k, station in nonempty(enumerate(expected)) for i in range(3))
 
 
-@pytest.mark.parametrize(("per_band", "sides"), [(1, [0]), (2, [1, -1]), (3, [1, 0, -1])])
-def test_points_of_a_band_stand_across_the_strip(per_band: int, sides: list[int]) -> None:
-    done = simulate(Spec(ground=Ground(crs="local"), control=Control(per_band=per_band, check=0, noise=NONE)))
-    north = done.control.enu[:, 1].reshape(3, per_band)
-    assert north / 920.0 == pytest.approx(np.tile(sides, (3, 1)), abs=0.15)
-
-
 @pytest.mark.parametrize(("layout", "count"), [("corners", 4), ("corners+centre", 5)])
 def test_corners(layout: str, count: int) -> None:
     done = simulate(Spec(ground=Ground(crs="local"), control=Control(layout=layout, check=0, noise=NONE)))
@@ -83,12 +76,6 @@ def test_random_control_and_check_points_are_as_many_as_asked_for() -> None:
     assert not np.allclose(other.control.enu, control.enu)
 
 
-def test_check_points_are_half_of_what_is_left_when_there_are_few() -> None:
-    done = simulate(Spec(flight=Flight(photos=3), points=Points(extra_per_model=4)))
-    assert done.control.check.sum() == 4
-    assert simulate(Spec()).control.check.sum() == 10
-
-
 @pytest.mark.parametrize(
     ("control", "message"),
     [
@@ -99,18 +86,6 @@ def test_check_points_are_half_of_what_is_left_when_there_are_few() -> None:
 def test_too_many_points_are_refused(control: Control, message: str) -> None:
     with pytest.raises(InputError, match=message):
         simulate(Spec(control=control))
-
-
-def test_shares_of_full_plan_and_height_points() -> None:
-    use = {"xyz": 0.5, "xy": 0.3, "z": 0.2}
-    done = simulate(Spec(flight=Flight(photos=20), control=Control(bands=7, use=use)))
-    kinds = [
-        "".join(axis for axis, used in zip("xyz", row, strict=True) if used)
-        for row in done.control.use[~done.control.check]
-    ]
-    assert [kinds.count(kind) for kind in ("xyz", "xy", "z")] == [11, 6, 4]  # of 21: 10.5, 6.3, 4.2
-    assert done.control.use[done.control.check].all()
-    assert np.array_equal(np.isnan(done.control.enu), ~done.control.use)
 
 
 def test_without_noise_the_given_coordinates_are_true() -> None:
@@ -160,13 +135,3 @@ def test_two_zones_give_the_same_points() -> None:
     assert done.control.enu[east] == pytest.approx(np.column_stack([e, n, true[east, 2]]), abs=1e-4)
     longitude, _ = Transformer.from_crs("EPSG:31468", "EPSG:4314", always_xy=True).transform(true[:, 0], true[:, 1])
     assert np.array_equal(np.array(longitude) >= 13.5, east)
-
-
-@pytest.mark.parametrize(("boundary", "place"), [(179.98, 180.0), (-179.98, -179.99), (None, 180.0)])
-def test_a_boundary_near_the_meridian_of_180_degrees(boundary: float | None, place: float) -> None:
-    control = Control(every=2, second_crs="EPSG:32601", boundary_longitude_deg=boundary)
-    done = simulate(Spec(ground=Ground(crs="EPSG:32660", center_deg=(place, 20.0)), control=control))
-    assert set(done.control.frame.tolist()) == {0, 1}
-    east_of_all = done.control.enu[done.control.frame == 1, 0]
-    assert (east_of_all < 500_000.0).all()  # just beyond the western edge of zone 1
-    assert (done.control.enu[done.control.frame == 0, 0] > 500_000.0).all()

@@ -27,25 +27,3 @@ def test_normal_numbers_are_normal() -> None:
     drawn = Draws(3, Purpose.IMAGE).normal(COUNT)
     assert stats.kstest(drawn, "norm").pvalue > 0.01
     assert abs(np.corrcoef(drawn[:-1], drawn[1:])[0, 1]) < 4 / np.sqrt(COUNT)
-
-
-def test_uniform_numbers_fill_their_interval() -> None:
-    drawn = Draws(3, Purpose.POINTS).between(COUNT)
-    assert stats.kstest(drawn, "uniform", args=(-1, 2)).pvalue > 0.01
-    assert drawn.min() >= -1
-    assert drawn.max() < 1
-
-
-def test_number_i_does_not_depend_on_how_many_are_drawn() -> None:
-    assert np.array_equal(Draws(5, Purpose.GNSS).normal(4, 3)[:2], Draws(5, Purpose.GNSS).normal(2, 3))
-
-
-def test_an_order_holds_every_number_once() -> None:
-    assert sorted(Draws(2, Purpose.ROLES).order(100).tolist()) == list(range(100))
-    assert Draws(2, Purpose.ROLES).order(100).tolist() != Draws(3, Purpose.ROLES).order(100).tolist()
-
-
-def test_streams_are_independent() -> None:
-    drawn = np.array([Draws(4, purpose, number).normal(2000) for purpose in Purpose for number in (0, 1)])
-    beside = np.corrcoef(drawn) - np.eye(len(drawn))
-    assert np.abs(beside).max() < 5 / np.sqrt(2000)

@@ -48,16 +48,6 @@ def test_a_named_image_error() -> None:
     assert size == pytest.approx(-0.25)
 
 
-def test_a_check_point_answers_to_the_name_of_its_pass_point() -> None:
-    for point in ("1002-2", "1005-5", "1001-3"):
-        done = simulate(replace(FREE, gross_errors=(GrossError("image", point=point),)))
-        ((row, _),) = changed(done)
-        plain = simulate(replace(FREE, control=Control(layout="random", count=1, check=0)))
-        observations = plain.observations
-        assert observations.point_ids[observations.point[row]] in {point, "G01"}
-        assert done.spec.gross_errors[0].point == point
-
-
 def test_random_image_errors() -> None:
     entries = (GrossError("image", count=40, size_um=100.0), GrossError("image", count=20, size_um=500.0, axis="x"))
     done = simulate(replace(FREE, film=Film(), gross_errors=entries))
@@ -69,12 +59,6 @@ def test_random_image_errors() -> None:
     assert {e.axis for e in first} == {"x", "y"}
     assert {e.size for e in first} == {0.1, -0.1}
     assert {e.axis for e in done.truth.errors if abs(e.size) > 0.2} == {"x"}
-
-
-def test_errors_on_one_photo() -> None:
-    done = simulate(replace(FREE, gross_errors=(GrossError("image", count=5, photo="1004"),)))
-    assert {error.photo for error in done.truth.errors} == {"1004"}
-    assert len(changed(done)) == 5
 
 
 def test_points_mistaken_for_each_other() -> None:
@@ -108,13 +92,6 @@ def test_control_errors(crs: str) -> None:
     assert np.count_nonzero(expected) == 3
     assert off == pytest.approx(expected, abs=0.005)  # grid metres against metres
     assert not off[done.control.check].any() or np.abs(off[done.control.check]).max() < 1e-6
-
-
-def test_control_errors_only_in_coordinates_that_are_given() -> None:
-    control = Control(bands=5, use={"z": 1.0}, noise=(0.0, 0.0, 0.0))
-    done = simulate(replace(FREE, control=control, gross_errors=(GrossError("control", count=15),)))
-    assert {error.axis for error in done.truth.errors} == {"z"}
-    assert len({error.point for error in done.truth.errors}) == 15
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pyproj import Geod, Transformer
 
 from photostrip.simulation import Flight, Ground, Spec, Terrain
-from photostrip.simulation.ground import surface, world
+from photostrip.simulation.flight import world
 
 GRS80 = (6378137.0, 6356752.314140356)
 ELLIPSOID_SHAPE = 0.004  # a flight on normals against a geodesic: the ellipsoid is not a sphere
@@ -67,26 +67,3 @@ def test_frames_are_rotations_with_the_normal_up(lon: float, lat: float, heading
     ahead = space.cartesian(place[0] + 1.0, place[1], np.zeros(1))[0] - low
     assert ahead @ frame[:, 0] == pytest.approx(1.0 * np.cos(t / space.radius), rel=ELLIPSOID_SHAPE)
     assert abs(ahead @ frame[:, 1]) < ELLIPSOID_SHAPE
-
-
-def test_a_flat_world_has_coordinates_in_metres() -> None:
-    space = world(Spec(flight=Flight(heading_deg=60.0)), None)
-    east, north, up = space.cartesian(np.array([1000.0]), np.array([0.0]), np.array([7.0]))[0]
-    assert (east, north, up) == pytest.approx((1000.0 * np.sqrt(0.75), 500.0, 7.0))
-    assert space.cartesian(np.array([0.0]), np.array([10.0]), np.array([0.0]))[0] == pytest.approx(
-        (-5.0, 10.0 * np.sqrt(0.75), 0.0)
-    )
-
-
-@given(st.integers(0, 1000), st.floats(1.0, 2000.0))
-def test_no_hill_is_higher_than_the_relief(seed: int, relief: float) -> None:
-    terrain = surface(Spec(seed=seed, terrain=Terrain(height=100.0, relief=relief)))
-    s, t = np.meshgrid(np.linspace(-2e4, 2e4, 60), np.linspace(-3e3, 3e3, 20))
-    height = terrain(s.ravel(), t.ravel()) - 100.0
-    assert np.abs(height).max() <= relief * (1 + 1e-12)
-    assert np.ptp(height) >= 0.5 * relief
-
-
-def test_a_slope_rises_as_stated() -> None:
-    terrain = surface(Spec(terrain=Terrain(height=100.0, relief=0.0, slope_percent=(2.0, -1.0))))
-    assert terrain(np.array([0.0, 1000.0, 0.0]), np.array([0.0, 0.0, 1000.0])).tolist() == [100.0, 120.0, 90.0]

@@ -24,20 +24,6 @@ def test_noise_is_normal_and_as_large_as_stated() -> None:
     assert (done.observations.sigma == 0.007).all()
 
 
-def test_twice_the_noise_is_the_same_noise_doubled() -> None:
-    one, two = (simulate(Spec(image=Image(sigma_um=s))) for s in (5.0, 10.0))
-    assert np.array_equal(one.truth.image, two.truth.image)
-    assert two.observations.xy - two.truth.image == pytest.approx(
-        2 * (one.observations.xy - one.truth.image), abs=1e-12
-    )
-
-
-def test_without_noise_the_truth_is_measured_and_a_sigma_is_stated() -> None:
-    done = simulate(Spec(image=Image(sigma_um=0.0)))
-    assert np.array_equal(done.observations.xy, done.truth.image)
-    assert (done.observations.sigma == 0.001).all()
-
-
 @pytest.mark.parametrize("irregular_um", [0.0, 4.0])
 def test_an_affine_transformation_on_the_marks_finds_the_photo(irregular_um: float) -> None:
     film = Film(irregular_um=irregular_um)
@@ -83,15 +69,6 @@ def test_the_irregular_deformation_has_its_rms() -> None:
     spec = replace(LARGE, image=Image(sigma_um=0.0))
     moved = simulate(replace(spec, film=film)).truth.image - simulate(spec).truth.image
     assert 1000 * moved.std() == pytest.approx(5.0, rel=0.1)
-
-
-def test_marks_are_measured_with_the_noise_of_the_points() -> None:
-    spec = replace(LARGE, film=Film(), image=Image(sigma_um=6.0))
-    noisy, free = simulate(spec).fiducials, simulate(replace(spec, image=Image(sigma_um=0.0))).fiducials
-    assert noisy is not None
-    assert free is not None
-    error = noisy.xy - free.xy
-    assert error.std() == pytest.approx(0.006, rel=4 / np.sqrt(2 * error.size))
 
 
 @pytest.mark.parametrize("crs", ["EPSG:32733", "geocentric", "local"])

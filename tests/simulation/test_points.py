@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,45 +70,6 @@ def test_gruber_points_stand_where_they_should() -> None:
     assert Counter(Counter(done.observations.point.tolist()).values()) == {3: 24, 2: 6}
 
 
-def test_no_two_points_are_moved_to_one_place() -> None:
-    # 1020-1 and 1020-2 stood at one place: two ids for one point, as the gate rightly said
-    flight = Flight(
-        photos=22,
-        end_lap_percent=59.62081181608995,
-        scale=10022.362276306998,
-        heading_deg=66.03939775455235,
-        attitude_sigma_deg=(2.0, 2.0, 2.0),
-    )
-    camera = replace(FILM, principal_distance=305.0)
-    points = Points(rows=5, extra_per_model=5)
-    ground = Ground("EPSG:32719", center_deg=(-68.0, -33.0))
-    spec = Spec(seed=100520, camera=camera, ground=ground, flight=flight, terrain=Terrain(relief=0.0),
-                points=points)  # fmt: skip
-    xyz = simulate(spec).truth.points.xyz
-    one, other = np.triu_indices(len(xyz), 1)
-    assert np.linalg.norm(xyz[one] - xyz[other], axis=1).min() > 0.01
-
-
-def test_ids_are_unique_and_say_where_a_point_is() -> None:
-    done = simulate(Spec(flight=Flight(photos=5, strips=2), points=Points(extra_per_model=2), control=Control(check=3)))
-    ids = done.observations.point_ids
-    assert len(set(ids)) == len(ids) == 2 * (5 * 3 + 4 * 2)
-    assert done.strips == (
-        ("A", ("1001", "1002", "1003", "1004", "1005")),
-        ("B", ("2001", "2002", "2003", "2004", "2005")),
-    )
-    assert "1002-4" in ids or "1002-5" in ids
-    assert [name for name in ids if name.startswith("G")] != []
-
-
-def test_neighbouring_strips_share_points() -> None:
-    done = simulate(Spec(flight=Flight(strips=3)))
-    on = photos_of(done)
-    strips = [set().union(*on[10 * j : 10 * j + 10]) for j in range(3)]
-    assert len(strips[0] & strips[1]) >= 10
-    assert len(strips[1] & strips[2]) >= 10
-
-
 def test_overlaps_are_those_asked_for() -> None:
     flight = Flight(
         strips=2, end_lap_percent=62.0, side_lap_percent=25.0, position_sigma=(0.0, 0.0, 0.0), flying_height=1530.0
@@ -118,19 +78,6 @@ def test_overlaps_are_those_asked_for() -> None:
     assert np.diff(centers[0, :, 0]) == pytest.approx(0.38 * 2300.0)
     assert centers[1, :, 1] - centers[0, :, 1] == pytest.approx(0.75 * 2300.0)
     assert centers[..., 2] == pytest.approx(1830.0)
-
-
-def test_a_turned_photo_uses_its_largest_upright_rectangle() -> None:
-    assert Spec(flight=Flight(photo_rotation_deg=90.0), camera=DIGITAL).footprint == pytest.approx((1038.6, 678.6))
-    assert Spec(flight=Flight(photo_rotation_deg=180.0), camera=DIGITAL).footprint == pytest.approx((678.6, 1038.6))
-    assert Spec(flight=Flight(photo_rotation_deg=45.0)).footprint == pytest.approx(
-        (2300 / np.sqrt(2), 2300 / np.sqrt(2))
-    )
-
-
-def test_time_grows_with_the_photos_only() -> None:
-    done = simulate(Spec(flight=Flight(photos=1000), points=Points(extra_per_model=9)))
-    assert 28 <= len(done.observations) / 1000 <= 36
 
 
 def test_points_that_nobody_can_see_refuse_the_strip() -> None:

@@ -46,12 +46,6 @@ ALL = np.ones(len(PLACES), bool)
 angle = st.floats(-0.05, 0.05)
 
 
-@given(angle, angle, angle)
-def test_points_go_where_a_turned_camera_sees_them(right: float, up: float, roll: float) -> None:
-    given_ = pair((right, up, roll))
-    np.testing.assert_allclose(turned(given_.before, F, np.array([right, up, roll])), given_.after, atol=1e-11)
-
-
 @pytest.mark.parametrize(
     ("turn", "change"), [((1e-4, 0, 0), (-0.01, 0)), ((0, 1e-4, 0), (0, -0.01)), ((0, 0, 1e-4), (0, 0))]
 )
@@ -87,10 +81,6 @@ def test_how_many_points_a_turn_needs(points: int, column: int | None, determine
     assert (found is not None) == determined
 
 
-def test_two_points_in_one_place_do_not_determine_a_turn() -> None:
-    assert fit(pair((0, 0, 0), places=PLACES[[0, 0]]), np.ones(2, bool)) is None
-
-
 @pytest.mark.slow
 def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
     turn, draws = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 16 * PLACES.size  # in two epochs: eight blocks
@@ -103,25 +93,6 @@ def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
     still = [fit(pair((0, 0, 0), drawn=row), ALL) for row in rows]
     assert np.mean([each.statistic for each in still if each is not None]) == pytest.approx(3.0, abs=0.4)
     assert np.mean([each.weighted_sum for each in still if each is not None]) == pytest.approx(11.0, abs=0.6)
-
-
-@pytest.mark.parametrize("point", range(len(PLACES)))
-def test_the_fit_without_a_point_is_the_fit_to_the_others(point: int) -> None:
-    given_ = pair((40 * ARCSECOND, 0, 0), 3)
-    whole, others = fit(given_, ALL), fit(given_, np.arange(len(PLACES)) != point)
-    assert whole is not None
-    assert others is not None
-    (values,), (normal,), (known,) = whole.predict(np.array([point]))
-    assert known
-    np.testing.assert_allclose(values, others.values, atol=1e-3 * others.sigma.min())
-    np.testing.assert_allclose(normal, others.normal, rtol=1e-3)
-
-
-def test_a_point_that_the_turn_rests_on_has_no_prediction() -> None:
-    given_ = pair((0, 0, 0), 3, PLACES[:2])
-    found = fit(given_, np.ones(2, bool))
-    assert found is not None
-    assert found.predict(np.array([0]))[2].tolist() == [False]
 
 
 # ------------------------------------------------------------------------------------------------- moved points
@@ -142,16 +113,3 @@ def test_a_stable_point_that_moved_is_found(point: int, turn: tuple[float, float
     assert not motion.used[point]
     assert motion.turns[0] is not None
     assert np.abs((motion.turns[0].values - turn) / motion.turns[0].sigma).max() < 4
-
-
-@pytest.mark.slow
-def test_clean_stable_points_are_kept() -> None:
-    lost = [bool(find_motion(pair((0, 0, 0), seed), pair((0, 0, 0), 1000 + seed)).rejected) for seed in range(300)]
-    assert 0 < sum(lost) < 10  # 1 % of 300 is 3
-
-
-def test_one_camera_may_have_no_turn() -> None:
-    other = ImagePair(PLACES, np.full_like(PLACES, np.nan), np.ones_like(PLACES), F)
-    motion = find_motion(pair((1e-3, 0, 0), 1), other)
-    assert motion.turns[0] is not None
-    assert motion.turns[1] is None

@@ -9,19 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.errors import GeometryError
-from photostrip.terrestrial.frame import (
-    angles_of,
+from photostrip.terrestrial.normal_case import (
     direction_gradient,
     directions_from_photo,
     directions_of,
     ground_from_photo,
     partials,
     photo_from_directions,
-    small_turn,
-    vectors_of,
 )
-from photostrip.units import ARCSECONDS
 from tests.terrestrial.simulated import attitude
 from tests.vectors import cases
 
@@ -32,7 +27,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ROUNDING = 1e-12
 DIFFERENCE = 1e-6  # step of differences, mm or rad
 
 azimuths = st.floats(-np.pi, np.pi)
@@ -44,58 +38,12 @@ places = st.tuples(st.floats(-90.0, 90.0), st.floats(-65.0, 65.0))
 # ------------------------------------------------------------------------------------------------------- rotation
 
 
-def test_a_level_camera_has_the_direction_cosines_of_the_source() -> None:
-    alpha = 0.7
-    rotation = ground_from_photo(alpha)
-    np.testing.assert_allclose(rotation[:, 0], [np.cos(alpha), -np.sin(alpha), 0], atol=ROUNDING)
-    np.testing.assert_allclose(-rotation[:, 2], [np.sin(alpha), np.cos(alpha), 0], atol=ROUNDING)
-    np.testing.assert_allclose(rotation[:, 1], [0, 0, 1], atol=ROUNDING)
-
-
 @given(azimuths, tilts, azimuths)
 def test_the_rotation_is_roll_then_elevation_then_azimuth(alpha: float, omega: float, kappa: float) -> None:
     columns = attitude(alpha, omega, kappa)
     rotation = ground_from_photo(alpha, omega, kappa)
     np.testing.assert_allclose(rotation, np.column_stack([columns[:, 0], columns[:, 2], -columns[:, 1]]), atol=1e-14)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize(
-    ("angles", "axis", "expected"),
-    [
-        ((np.pi / 2, 0, 0), 2, (-1, 0, 0)),  # looks east: what lies behind is west
-        ((0, 0.1, 0), 2, (0, -np.cos(0.1), -np.sin(0.1))),  # looks up
-        ((0, 0, 0.1), 0, (np.cos(0.1), 0, np.sin(0.1))),  # the right edge rises
-    ],
-)
-def test_signs(angles: tuple[float, float, float], axis: int, expected: tuple[float, float, float]) -> None:
-    np.testing.assert_allclose(ground_from_photo(*angles)[:, axis], expected, atol=1e-15)
-
-
-@given(azimuths, tilts, azimuths)
-def test_angles_come_back(alpha: float, omega: float, kappa: float) -> None:
-    rotation = ground_from_photo(alpha, omega, kappa)
-    np.testing.assert_allclose(ground_from_photo(*angles_of(rotation)), rotation, atol=1e-14)
-
-
-def test_a_camera_that_looks_straight_up_has_no_azimuth() -> None:
-    with pytest.raises(GeometryError, match="alpha and kappa cannot be separated"):
-        angles_of(ground_from_photo(0.3, np.pi / 2, 0.1))
-
-
-@given(azimuths, tilts, azimuths)
-def test_a_turn_of_a_level_camera_adds_to_its_angles(alpha: float, right: float, roll: float) -> None:
-    turned = ground_from_photo(alpha) @ small_turn([right / 10, 0.0, 0.0])
-    np.testing.assert_allclose(turned, ground_from_photo(alpha + right / 10), atol=1e-14)
-    rolled = ground_from_photo(alpha, 0.2, 0.0) @ small_turn([0.0, 0.0, roll / 10])
-    np.testing.assert_allclose(rolled, ground_from_photo(alpha, 0.2, roll / 10), atol=1e-14)
-
-
-@given(azimuths, st.floats(-1.5, 1.5))
-def test_directions_and_vectors_are_inverse(horizontal: float, vertical: float) -> None:
-    back = directions_of(vectors_of([horizontal, vertical]))
-    assert np.abs(np.angle(np.exp(1j * (back[0] - horizontal)))) < 1e-12
-    assert back[1] == pytest.approx(vertical, abs=1e-12)
 
 
 @given(st.tuples(*[st.floats(-5, 5)] * 3).filter(lambda v: np.hypot(v[0], v[1]) > 0.1))
@@ -155,34 +103,8 @@ def test_a_level_camera_follows_equations_2_and_3(f: float, place: tuple[float, 
     assert f * np.tan(beta) / np.cos(turned) == pytest.approx(z, abs=1e-9)
 
 
-@given(azimuths, st.floats(-0.5, 0.5), azimuths, distances, places)
-def test_partials_are_those_of_differences(
-    alpha: float, omega: float, kappa: float, f: float, place: tuple[float, float]
-) -> None:
-    rotation = ground_from_photo(alpha, omega, kappa)
-    if abs(directions_from_photo(place, f, rotation)[1]) > 1.3:  # near the zenith differences fail
-        return
-    by = partials(place, f, rotation)
-    h = 1e-4
-
-    def change(dx: float, dz: float, df: float) -> Floats:
-        here, step = np.array(place), np.array([dx, dz])
-        ahead = directions_from_photo(here + step, f + df, rotation)
-        behind = directions_from_photo(here - step, f - df, rotation)
-        difference: Floats = np.angle(np.exp(1j * (ahead - behind))) / (2 * h)
-        return difference
-
-    np.testing.assert_allclose(by.by_xz[:, 0], change(h, 0, 0), rtol=1e-5, atol=1e-8)
-    np.testing.assert_allclose(by.by_xz[:, 1], change(0, h, 0), rtol=1e-5, atol=1e-8)
-    np.testing.assert_allclose(by.by_f, change(0, 0, h), rtol=1e-5, atol=1e-8)
-
-
 @pytest.mark.parametrize("beyond", [np.pi / 2, np.pi, -2.0])
 def test_what_is_behind_the_camera_has_no_place_in_the_photo(beyond: float) -> None:
     xz = photo_from_directions([[0.3 + beyond, 0.1], [0.3, 0.1]], 100.0, ground_from_photo(0.3))
     assert np.isnan(xz[0]).all()
     assert np.isfinite(xz[1]).all()
-
-
-def test_a_second_of_arc_is_one() -> None:
-    assert pytest.approx(206264.80625) == ARCSECONDS

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.normal_case import displacements, ellipses, intersect, limit, statistic
+from photostrip.terrestrial.normal_case import displacements, ellipses, intersect, limit
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -106,19 +106,6 @@ def covariance(seed: int) -> Floats:
     return np.asarray(root @ root.T)
 
 
-@given(st.integers(0, 1000))
-def test_the_test_value_is_that_of_the_inverse_covariance(seed: int) -> None:
-    c, d = covariance(seed), Draws(seed, Purpose.IMAGE).normal(3)
-    assert statistic(d[None], c[None])[0] == pytest.approx(d @ np.linalg.inv(c) @ d, rel=1e-6)
-
-
-def test_without_a_covariance_there_is_no_test() -> None:
-    c = np.array([np.eye(3), np.full((3, 3), np.nan), np.zeros((3, 3)), np.diag([1.0, 1.0, 0.0]), np.eye(3)])
-    d = np.array([[1.0, 2, 2], [1, 1, 1], [1, 1, 1], [1, 1, 1], [np.nan, 1, 1]])
-    np.testing.assert_array_equal(statistic(d, c), [9.0, np.nan, np.nan, np.nan, np.nan])
-    assert np.isnan(statistic(d[1:], c[1:])).all()
-
-
 def test_limits_are_the_printed_quantiles_of_chi_square() -> None:
     assert limit(0.05) == pytest.approx(7.815, abs=5e-4)
     assert limit(0.01) == pytest.approx(11.345, abs=5e-4)
@@ -134,8 +121,3 @@ def test_ellipses_are_those_of_the_eigenvectors(seed: int) -> None:
     direction = np.array([np.sin(azimuth), np.cos(azimuth)])
     assert abs(direction @ axes[:, 1]) == pytest.approx(1.0, abs=1e-6)
     assert 0 <= azimuth < np.pi
-
-
-@pytest.mark.parametrize(("c", "azimuth"), [([[4, 0], [0, 1]], 90), ([[1, 0], [0, 4]], 0), ([[2, 1], [1, 2]], 45)])
-def test_azimuths_run_clockwise_from_the_second_axis(c: list[list[float]], azimuth: float) -> None:
-    assert np.degrees(ellipses(c, 0.95)[2]) == pytest.approx(azimuth)

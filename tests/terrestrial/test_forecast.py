@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from photostrip.statistics import chi2_quantile
-from photostrip.terrestrial.forecast import DisplacementSpec, plan_displacements
-from photostrip.terrestrial.frame import Phototheodolite
+from photostrip.terrestrial.accuracy import DisplacementSpec, plan_displacements
+from photostrip.terrestrial.normal_case import Phototheodolite
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.terrestrial.forecast import PlannedDisplacement
+    from photostrip.terrestrial.accuracy import PlannedDisplacement
 
     Floats = NDArray[np.float64]
 

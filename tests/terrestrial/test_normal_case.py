@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.frame import ground_from_photo, small_turn
-from photostrip.terrestrial.normal_case import StereoPair, intersect, meeting_z, normal_pair, to_normal
+from photostrip.terrestrial.normal_case import (
+    StereoPair,
+    ground_from_photo,
+    intersect,
+    meeting_z,
+    small_turn,
+    to_normal,
+)
 from tests.terrestrial.simulated import CENTERS, FOCAL, SIGMA, attitude, photo, world
 
 if TYPE_CHECKING:
@@ -58,23 +64,6 @@ def test_convergent_photos_give_back_the_points(
         np.testing.assert_allclose(normal.parallax, 0.0, atol=1e-10)
     else:
         assert np.isnan(normal.parallax).all()
-
-
-def test_the_normal_case_leaves_coordinates_alone() -> None:
-    pair = normal_pair(190.0, 50.0)
-    measured = np.array([[30.0, -12.0, -50.0, -12.0], [5.0, 7.0, -20.0, 7.2]])
-    normal = to_normal(measured, np.ones_like(measured), pair, rotations(pair, 2))
-    np.testing.assert_allclose(normal.coordinates[0], measured[0], atol=1e-12)
-    np.testing.assert_allclose(normal.coordinates[1], [5.0, 7.1, -20.0, 7.1], atol=1e-12)  # both rays give way alike
-    np.testing.assert_allclose(normal.parallax, [0.0, -0.2], atol=1e-12)
-    np.testing.assert_allclose(pair.ground_from_normal(), np.eye(3), atol=1e-15)
-
-
-def test_the_more_accurate_photo_gives_way_less() -> None:
-    pair = normal_pair(190.0, 50.0)
-    measured = np.array([[5.0, 7.0, -20.0, 7.2]])
-    normal = to_normal(measured, np.array([[1.0, 1.0, 1.0, 3.0]]), pair, rotations(pair, 1))
-    assert normal.coordinates[0, 1] == pytest.approx(7.05)
 
 
 def test_the_intersection_is_the_least_squares_one() -> None:
@@ -132,16 +121,6 @@ def test_derivatives_are_those_of_differences(with_right_z: bool) -> None:
             np.testing.assert_allclose(parallax, here.parallax_by_turn[:, column], rtol=1e-6, atol=1e-6)
 
 
-def test_derivatives_of_points_are_those_of_differences() -> None:
-    truth = world()
-    coordinates = to_normal(truth.exact(0), np.ones((30, 4)), truth.pair, rotations(truth.pair, 30)).coordinates
-    _, jacobian = intersect(coordinates, FOCAL[0], 40.0)
-    for column in range(4):
-        step = 1e-4 * np.eye(4)[column]
-        change = intersect(coordinates + step, FOCAL[0], 40.0)[0] - intersect(coordinates - step, FOCAL[0], 40.0)[0]
-        np.testing.assert_allclose(change / 2e-4, jacobian[:, :, column], atol=1e-6)
-
-
 # ---------------------------------------------------------------------------------------------------- degenerate
 
 
@@ -158,28 +137,3 @@ def test_cameras_that_look_along_the_base_or_apart_are_refused(alphas: tuple[flo
     pair = StereoPair(FOCAL, centers, np.array([ground_from_photo(each) for each in alphas]))
     with pytest.raises(GeometryError, match="look along the base, or away from each other"):
         pair.ground_from_normal()
-
-
-def test_rays_that_do_not_reach_the_normal_case_have_no_coordinates() -> None:
-    pair = StereoPair((100.0, 100.0), CENTERS, np.array([ground_from_photo(0.0), ground_from_photo(1.2)]))
-    measured = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 200.0, 0.0]])
-    normal = to_normal(measured, np.ones_like(measured), pair, rotations(pair, 2))
-    assert np.isnan(normal.coordinates[1]).all()
-    assert np.isfinite(normal.coordinates[0]).all()
-
-
-@pytest.mark.parametrize(("x_right", "determined"), [(-10.0, True), (9.89, True), (9.95, False), (11.0, False)])
-def test_small_and_negative_parallaxes_have_no_point(x_right: float, determined: bool) -> None:
-    xyz, _ = intersect(np.array([[10.0, 1.0, x_right, 1.0]]), 100.0, 50.0)
-    assert np.isfinite(xyz).all() == determined
-
-
-def test_exchanging_left_and_right_changes_nothing_on_the_ground() -> None:
-    truth = world()
-    pair = truth.pair
-    other = StereoPair(FOCAL[::-1], CENTERS[::-1], pair.rotations[::-1])
-    measured = truth.exact(0) + SIGMA * Draws(7, Purpose.IMAGE).normal(len(truth.points), 4)
-    swapped = measured[:, [2, 3, 0, 1]]
-    first = to_normal(measured, np.ones_like(measured), pair, rotations(pair, 30))
-    second = to_normal(swapped, np.ones_like(measured), other, rotations(other, 30))
-    np.testing.assert_allclose(located(second.coordinates, other), located(first.coordinates, pair), atol=1e-8)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.frame import ground_from_photo
+from photostrip.terrestrial.normal_case import ground_from_photo
 from photostrip.terrestrial.orientation import OrientationSettings, Sightings, orient
 from tests.draws import orthogonal_normal
 from tests.terrestrial.simulated import ARCSECOND, attitude
@@ -91,33 +91,6 @@ def test_two_points_are_enough_for_the_angles() -> None:
     assert upper > 2
 
 
-def test_horizontal_directions_alone_determine_a_photo() -> None:
-    angles = (0.5, 0.1, -0.05)
-    given_ = without(sightings(angles), *((point, 1) for point in range(len(PLACES))))
-    found = orient(given_, F, CENTRE)
-    np.testing.assert_allclose(found.values, angles, atol=1e-10)
-    assert found.dof == len(PLACES) - 3
-    assert np.isnan(found.residuals[:, 1]).all()
-
-
-def test_directions_that_were_not_measured_do_not_count() -> None:
-    given_ = sightings((0.5, 0.1, -0.05), seed=3)
-    partly = without(given_, (0, 1), (4, 0))
-    found = orient(partly, F, CENTRE)
-    assert found.dof == 2 * len(PLACES) - 2 - 3
-    assert np.isnan(found.residuals[0, 1])
-    assert np.isnan(found.redundancy[4, 0])
-    assert np.nansum(found.redundancy) == pytest.approx(found.dof)
-
-
-def test_the_zero_of_the_circle_goes_into_alpha_alone() -> None:
-    given_ = sightings((0.5, 0.1, -0.05), seed=3)
-    turned = replace(given_, directions=given_.directions + np.array([2.5, 0.0]))
-    first, second = orient(given_, F, CENTRE), orient(turned, F, CENTRE)
-    np.testing.assert_allclose(second.values - first.values, [2.5, 0, 0], atol=1e-10)
-    np.testing.assert_allclose(second.residuals, first.residuals, atol=1e-12)
-
-
 # ------------------------------------------------------------------------------------- against another adjustment
 
 
@@ -194,25 +167,6 @@ def test_a_gross_error_is_found_and_named(method: str, point: int, image: tuple[
     np.testing.assert_allclose(found.values, angles, atol=6 * found.sigma.max())
 
 
-def test_two_gross_errors_are_found_one_after_the_other() -> None:
-    given_ = spoiled(spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), 6, (0.0, 0.2))
-    found = orient(given_, F, CENTRE)
-    assert [each.row for each in found.rejected] == [6, 2]
-
-
-def test_without_screening_a_gross_error_stays_and_shows_in_sigma0() -> None:
-    found = orient(
-        spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), F, CENTRE, OrientationSettings(screening="none")
-    )
-    assert not found.rejected
-    assert found.sigma0 > found.sigma0_range(0.05)[1] * 2
-
-
-def test_points_that_nothing_controls_are_not_rejected() -> None:
-    given_ = spoiled(sightings((0.3, 0.1, 0.0), 5, PLACES[[0, 8]]), 0, (5.0, 0.0))
-    assert not orient(given_, F, CENTRE).rejected
-
-
 # ------------------------------------------------------------------------------------------------------ refusals
 
 
@@ -229,22 +183,6 @@ def test_what_the_points_cannot_separate_is_named() -> None:
         orient(sightings((0.3, 0.1, 0.0), places=close), F, settings=OrientationSettings(EVERYTHING))
     assert error.value.exit_code == 3
     assert error.value.points == ("P0", "P1", "P2", "P3")
-
-
-def test_points_in_one_place_do_not_determine_the_roll() -> None:
-    with pytest.raises(GeometryError, match=r"cannot (determine|separate) .*kappa"):
-        orient(sightings((0.3, 0.0, 0.0), places=np.array([CENTRE, CENTRE])), F, CENTRE)
-
-
-def test_directions_of_other_points_are_refused_or_scatter() -> None:
-    given_ = sightings((0.3, 0.1, 0.0), 5)
-    wrong = replace(given_, directions=given_.directions[::-1] * [1.0, -1.0])
-    try:
-        found = orient(wrong, F, CENTRE, OrientationSettings(screening="none"))
-    except GeometryError as error:
-        assert error.code in {"not-converged", "undetermined"}  # noqa: PT017
-    else:
-        assert found.sigma0 > 100
 
 
 # ---------------------------------------------------------------------- eccentricity of the front node, refraction
@@ -302,21 +240,6 @@ def test_a_refraction_coefficient_is_found_or_given() -> None:
     assert found.refraction == pytest.approx(0.7)
     fixed = orient(given_, F, CENTRE, OrientationSettings(eccentricity=0.12, refraction=0.7))
     assert fixed.values == pytest.approx(np.array(angles), abs=1e-11)
-
-
-@pytest.mark.slow
-def test_the_standard_deviation_of_the_coefficient_is_its_scatter() -> None:
-    angles, found = (0.4, 0.08, -0.02), []
-    exact = from_the_theodolite(angles, 0.0, refraction=0.13)
-    rows = orthogonal_normal(np.random.default_rng(1), 4 * PLACES.size, 2 * PLACES.size)  # two blocks
-    for noise in rows.reshape(-1, 2, *PLACES.shape):
-        given_ = replace(
-            exact, xz=exact.xz + SIGMA_XZ * noise[0], directions=exact.directions + SIGMA_DIRECTION * noise[1]
-        )
-        found.append(orient(given_, F, CENTRE, OrientationSettings(("refraction",), screening="none")))
-    values = np.array([each.values[-1] for each in found])
-    assert values.std(ddof=1) == pytest.approx(found[0].sigma[-1], rel=0.1)
-    assert abs(values.mean() - 0.13) < 0.24 * found[0].sigma[-1]
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Adjust many projects, each in a process of its own, and sum them up.
+    """Adjust many projects, on all cores or many machines.
 
     With -o, the result of each project goes into a folder of its own below DIR, and DIR gets summary.txt, summary.csv,
     summary.json and junit.xml; with --html also summary.html, with a map and links to a report.html for each

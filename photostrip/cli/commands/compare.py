@@ -43,7 +43,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Compare a result with a baseline, within tolerances for each kind of quantity; or with the truth it came from.
+    """Compare a result with a baseline, or with the truth it came from.
 
     Plan, height, rotations, sigma0, scale factors, precision, statistics and counts are compared as numbers; ids,
     choices, rejected measurements and findings as sets. The exit code is 1 when they differ, 2 when they cannot be

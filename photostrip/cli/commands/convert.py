@@ -83,7 +83,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = False,
     quiet: Silent = False,
 ) -> None:
-    """Write an ordinary project from other programs' files, to be checked, edited and run; or a result for them.
+    """Write a project from other programs' files, or a result for them.
 
     DIR gets project.yaml, observations.csv, orientations.csv and, where they are given, control.csv and positions.csv.
     Printed is what was understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for

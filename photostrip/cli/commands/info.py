@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli import documents
 from photostrip.cli.failures import failures_as
+from photostrip.cli.sheets import Printed, deliver
 from photostrip.cli.stdout import Format
 
 
@@ -16,7 +16,7 @@ def info(
         Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed: text or json.")
     ] = Format.TEXT,
 ) -> None:
-    """Print versions, threads, formats and extras, and how to get what is missing.
+    """Print versions and formats, and how to get what is missing.
 
     Include it in every report of a problem.
     """
@@ -31,20 +31,12 @@ def info(
     typer.echo(as_text(found), nl=False)
 
 
-def sources(
-    form: Annotated[documents.Form, typer.Option("--format", help="How the answer is printed.")] = "text",
-) -> None:
-    """Compute every worked number of the sources again, beside what is printed.
+def sources(form: Printed = "text") -> None:
+    """Compute every worked number of the sources again.
 
     Lists every misprint, and the command and the function for every equation.
     """
     with failures_as(form):
-        from photostrip.cli.jobs.sources.tables import sources_document
-        from photostrip.formats.output.csv_text import to_csv
-        from photostrip.report.commands.sources import sources_report
+        from photostrip.sheets.sources import sources_sheet
 
-        rendering = documents.Rendering(
-            sources_report,
-            lambda found: to_csv(list(found["worked"][0]), (row.values() for row in found["worked"])),
-        )
-        rendering.show(sources_document(), form)
+        deliver(sources_sheet(), form)

@@ -49,7 +49,7 @@ def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
         document = as_reported(saved, file)
         sections_of(document, everything=True)  # what is incomplete is refused, whatever is printed
         if plots is not None:
-            from photostrip.report.pictures.result.pictures import picture_files
+            from photostrip.report.pictures.result import picture_files
 
             write_files(plots, picture_files(document))
         if output is None:

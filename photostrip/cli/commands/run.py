@@ -88,7 +88,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             messages.say(f"wrote {len(result.write(output, html=html))} files to {output}")
         if plots is not None:
             pictures = result.pictures()
-            write_files(plots, pictures)
+            write_files(plots, {f"{name}.svg": picture.file() for name, picture in pictures.items()})
             messages.say(f"wrote {len(pictures)} pictures to {plots}")
     print_result(result.document, form, width, Parts(quiet, verbose, section or ()))
     return exit_code(result.status, strict=strict)

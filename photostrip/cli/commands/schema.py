@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
+
+from photostrip.planning import PlanKind
+from photostrip.terrestrial import TerrestrialKind
 
 
 def schema(
@@ -13,8 +16,12 @@ def schema(
         bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
     ] = False,
     plan: Annotated[
-        Literal["model", "strip", "camera", "displacement", "screening"] | None,
+        PlanKind | None,
         typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
+    ] = None,
+    terrestrial: Annotated[
+        TerrestrialKind | None,
+        typer.Option("--terrestrial", help="The file of this computation of `photostrip terrestrial` instead."),
     ] = None,
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
@@ -26,7 +33,7 @@ def schema(
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of the project file: every key, its unit, its default.
+    """Print the JSON Schema of the project file, for editors.
 
     An editor that knows JSON Schema completes keys and explains them: write the schema to a file and begin the
     project file with `# yaml-language-server: $schema=photostrip.schema.json`.
@@ -45,7 +52,10 @@ def schema(
         found = result_schema()
     else:
         flags = {"tolerances": tolerances, "simulation": simulation}
-        kind = next((name for name, wanted in flags.items() if wanted), plan or "project")
+        kind = next(
+            (name for name, wanted in flags.items() if wanted),
+            plan or (f"terrestrial {terrestrial}" if terrestrial else "project"),
+        )
         found = schema_of(kind)
     text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
     if output is None:

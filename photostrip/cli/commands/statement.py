@@ -29,7 +29,7 @@ def statement(
     width: Width = None,
     quiet: Quiet = False,
 ) -> int:
-    """State the accuracy of a result in the words of the norms, to be signed.
+    """State the accuracy of a result by the norms, to be signed.
 
     The ASPRS standard (edition 2, 2024) tests with 30 check points and counts their own error; beside it stand the
     measures of ISO 19157, CE90 and LE90, and the NSSDA. The exit code is 1

@@ -35,7 +35,7 @@ FORMATS = {
         "trace of every iteration (text, Markdown, JSON): photostrip run --trace",
         "rule for make: photostrip run --depfile",
         "JSON Schema: photostrip schema",
-        "completion of shells: photostrip completion",
+        "completion of shells: photostrip --install-completion",
     ],
 }
 FOR_DEVELOPMENT = ("test", "dev", "peer")  # extras for those who work on photostrip itself

@@ -19,12 +19,12 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import DECIMAL_COMMA, SMALLEST_LENGTH, NotANumber, number, shown
-from photostrip.formats.text.rows import Cells, PlainRows, SplitRows
+from photostrip.formats.text.numbers import DECIMAL_COMMA, LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber, number, shown
 from photostrip.formats.text.table_text import UNDECLARED, Form, TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
 from photostrip.notes import Note, counted, listed
 
+Cells = Sequence[str]
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
 STANDARD_DEVIATIONS = {"s", "sd", "std", "sigma", "stdev", "accuracy", "precision"}  # one column for all coordinates
 WORDS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}  # that a project has for separators
@@ -76,6 +76,22 @@ def _add_new(names: Iterable[str], index: dict[str, int]) -> None:
     """Give numbers to the names that have none yet, in order of first appearance."""
     new = [name for name in dict.fromkeys(names) if name not in index]
     index.update(zip(new, count(len(index)), strict=False))
+
+
+def floats(cells: Cells, decimal: str = ".") -> Floats | None:
+    """Return the numbers that stand in a column; None when a cell needs a closer look."""
+    joined = "".join(cells)
+    if decimal != ".":
+        if "." in joined:
+            return None
+        cells = [cell.replace(decimal, ".") for cell in cells]
+    if not joined.isascii() or "_" in joined:  # float() takes digits of every script, and 1_000
+        return None
+    try:
+        values = np.fromiter(map(float, cells), float, len(cells))
+    except ValueError:
+        return None
+    return values if (np.abs(values) <= LARGEST_NUMBER).all() else None
 
 
 class _Reader:
@@ -244,18 +260,12 @@ class _Reader:
             message = f"{counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
             self.findings.notes.append(Note("unused-column", message, "note", file=self.source.file, line=line))
 
-    def _chunks(self) -> Iterator[tuple[PlainRows | SplitRows, Numbers]]:
-        """Give rows with the numbers of their lines, some thousands at a time."""
-        line = self.above
-        start = self.source.start_of(line + 1)
-        while plain := self.source.plain(start, self.width):
-            rows, start = plain
-            yield rows, np.arange(line + 1, line + 1 + len(rows))
-            line += len(rows)
-        for read, numbers in self._rows(start, line):
-            even, lines = self._even(read, numbers) if set(map(len, read)) - {self.width} else (read, numbers)
+    def _chunks(self) -> Iterator[tuple[list[Cells], Numbers]]:
+        """Give columns of texts with the numbers of their lines, some thousands of rows at a time."""
+        for read, numbers in self._rows(self.source.start_of(self.above + 1), self.above):
+            even, lines = self._even(read, numbers)
             if even:
-                yield SplitRows(list(zip(*even, strict=True)), self.form.decimal), np.array(lines, np.intp)
+                yield list(zip(*even, strict=True)), np.array(lines, np.intp)
 
     def _rows(self, start: int, before: int) -> Iterator[tuple[list[list[str]], list[int]]]:
         """Give rows from a byte of the text on with their line numbers; `before` is that of the line before them."""
@@ -286,28 +296,19 @@ class _Reader:
             message = f"cannot be read as CSV ({error})"
         self._add(line, "", message, "csv", fix=fix)
 
-    def _take(self, rows: PlainRows | SplitRows, lines: Numbers) -> None:
+    def _take(self, cells: list[Cells], lines: Numbers) -> None:
         """Turn a chunk of rows into columns."""
-        values = {each: rows.numbers(self.source.where[each.name]) for each in self.columns if each.number}
-        if any(each is None for each in values.values()):
-            fields = [rows.texts(place) for place in range(self.width)]
-            kept = [row for row, cells in enumerate(zip(*fields, strict=True)) if any(map(str.strip, cells))]
-            if len(kept) < len(lines):  # rows of empty cells, as spreadsheets leave them behind
-                if kept:
-                    cells_kept = [[cells[row] for row in kept] for cells in fields]
-                    self._take(SplitRows(cells_kept, self.form.decimal), lines[kept])
-                return
         for column in self.columns:
-            name, place = column.name, self.source.where[column.name]
+            name, texts = column.name, cells[self.source.where[column.name]]
             if column.number:
-                fast = values[column]
-                self.numbers[name].append(self._floats(column, rows.texts(place), lines) if fast is None else fast)
+                fast = floats(texts, self.form.decimal)
+                self.numbers[name].append(self._floats(column, texts, lines) if fast is None else fast)
                 if column.positive:
                     self._positive(column, lines)
             else:
-                cells, index = rows.texts(place), self.index[name]
-                _add_new(cells, index)
-                self.codes[name].append(np.fromiter(map(index.__getitem__, cells), np.intp, len(cells)))
+                index = self.index[name]
+                _add_new(texts, index)
+                self.codes[name].append(np.fromiter(map(index.__getitem__, texts), np.intp, len(texts)))
         self.lines.append(lines)
 
     def _even(self, rows: list[list[str]], lines: list[int]) -> tuple[list[list[str]], list[int]]:

@@ -12,13 +12,11 @@ from pathlib import Path
 
 from photostrip.errors import Fault
 from photostrip.formats.text.files import BOM, GZIP, MEGABYTE, decode, read_bytes, refuse
-from photostrip.formats.text.rows import PlainRows, plain_rows
 
 LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
 MOST_LINES = 5_000_000  # of a table; a row takes 0.2 to 0.4 kB once it is read, however few bytes it has
 LONGEST_LINE = 20_000  # bytes; each of its fields takes 60 bytes and more
 BLOCK_BYTES = 4 * MEGABYTE
-BLOCK = MEGABYTE // 5  # bytes of rows that are taken at a time; what comes of them stays in the cache
 LINE_END = re.compile(rb"\r\n|\r|\n")
 
 
@@ -60,12 +58,6 @@ class TableText:
         """Return the byte at which a line begins, counted from 1."""
         before = [end.end() for end in islice(LINE_END.finditer(self.data), line - 1)]
         return 0 if line == 1 else before[-1] if len(before) == line - 1 else len(self.data)
-
-    def plain(self, start: int, width: int) -> tuple[PlainRows, int] | None:
-        """Find rows from a byte on, and where the next one begins; None where ``csv`` has to split them."""
-        stop = self.data.find(b"\n", start + BLOCK) + 1 or len(self.data)
-        rows = plain_rows(self.data[start:stop], width, self.form.separator, self.form.decimal)
-        return None if rows is None else (rows, stop)
 
     @cached_property
     def _lines(self) -> list[str]:

@@ -10,20 +10,17 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.network import defects, reliability, self_calibration, variance_components
+from photostrip.network import defects, reliability, self_calibration, snooping
+from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
+from photostrip.network.cofactors import Correlation, correlations
 from photostrip.network.cofactors import cofactors_of as precision_of
-from photostrip.network.correlations import Correlation, correlations
-from photostrip.network.gross_errors import snooping
-from photostrip.network.gross_errors.snooping import ScreenedBundle
 from photostrip.network.hypotheses import taken_up
-from photostrip.network.selection import Selection, restarted, selected, supported
-from photostrip.network.solution import BundleSolution, Cofactors
-from photostrip.network.solve import solve
+from photostrip.network.snooping import ScreenedBundle
 from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import models as block_models
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
-from photostrip.pipeline.block.check_points import check_errors
+from photostrip.pipeline.block.block_result import check_errors
 from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import POLYNOMIAL, SIMILARITY, Inputs, Settings
@@ -211,7 +208,7 @@ class _Estimated(NamedTuple):
     screened: ScreenedBundle
     sigma0: reliability.Sigma0Test  # with the stated standard deviations
     asked: Sequence[str]  # names of the unknowns that the project asks for
-    components: tuple[variance_components.Component, ...] = ()
+    components: tuple[reliability.Component, ...] = ()
 
 
 def _searched(
@@ -254,7 +251,7 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
     asked, problem = block.problem.common_names(), block.problem
     for shared in before.screened.common:
         problem = taken_up(problem, shared)
-    problem = variance_components.scaled(problem, before.components, block.level)
+    problem = reliability.scaled(problem, before.components, block.level)
     screened = ScreenedBundle.of(problem, supported(problem, block.begin), settings.bundle)
     screened = replace(screened, common=before.screened.common)
     sigma0 = reliability.sigma0_test(screened.solution, TEST_LEVEL)
@@ -269,15 +266,15 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
 
 def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
     """Estimate variance components, then search for gross errors once more with the standard deviations found."""
-    found: tuple[variance_components.Component, ...] = ()
+    found: tuple[reliability.Component, ...] = ()
     block, screened = before.block, before.screened
     problem, level, done = block.problem, block.level, screened
     quiet = replace(settings.bundle, screening="none")
-    for _ in range(variance_components.ITERATIONS):
-        step = variance_components.components(done.problem, done.solution, done.precision, level)
-        found = variance_components.combined(found, step)
-        problem = variance_components.scaled(restarted(problem, done.solution), step, level)
-        if variance_components.converged(step):
+    for _ in range(reliability.ITERATIONS):
+        step = reliability.components(done.problem, done.solution, done.precision, level)
+        found = reliability.combined(found, step)
+        problem = reliability.scaled(restarted(problem, done.solution), step, level)
+        if reliability.converged(step):
             break
         chosen = selected(problem, screened.selection)
         done = snooping.screen_bundle(chosen, screened.selection, quiet)

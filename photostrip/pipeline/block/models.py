@@ -14,9 +14,9 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
+from photostrip.network.adjustment import Selection
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
-from photostrip.network.selection import Selection
-from photostrip.pipeline.block import block_notes
+from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block.problem import control_begun, control_observations
 from photostrip.pipeline.common_points import in_output, mean_points
 from photostrip.pipeline.frames import GroundFrames
@@ -181,7 +181,7 @@ def adjusted_strips(
         ties=Ties.none(),  # a point has one position
         observations=observations,
         precision=precision,
-        notes=block_notes.notes(bundle),
+        notes=block_result.notes(bundle),
         bundle=bundle,
     )
 

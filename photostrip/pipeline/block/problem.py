@@ -12,6 +12,7 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import from_angles
+from photostrip.network.adjustment import Selection
 from photostrip.network.problem import (
     AttitudeObservations,
     BundleCameras,
@@ -21,7 +22,6 @@ from photostrip.network.problem import (
     PositionObservations,
     StartValues,
 )
-from photostrip.network.selection import Selection
 from photostrip.network.self_calibration import sigmas
 from photostrip.network.settings import ASKED
 from photostrip.pipeline import overruling
@@ -29,8 +29,8 @@ from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
 from photostrip.pipeline.results import BlockProblem, BlockStart
 from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.strip.gross_errors.control.control_screening import majority
-from photostrip.strip.resection.collinearity import KnownPhotos, project
+from photostrip.strip.gross_errors.control_screening import majority
+from photostrip.strip.resection import KnownPhotos, project
 
 FAR_FROM_RAY = 5.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations

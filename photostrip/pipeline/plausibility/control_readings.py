@@ -23,16 +23,16 @@ from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.on_control import HeldStrip, OnControl
-from photostrip.pipeline.plausibility.shared_control import FIX, other_distance, shifted_list
+from photostrip.pipeline.plausibility.shared_errors import FIX, other_distance, shifted_list
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
-from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
-from photostrip.plausibility.control.slips import LIMIT
-from photostrip.plausibility.control.wrong_place import FOOT, KINDS_OF_FEET
 from photostrip.plausibility.finding import Evidence
+from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights, find_shared
+from photostrip.plausibility.slips import LIMIT
+from photostrip.plausibility.wrong_place import FOOT, KINDS_OF_FEET
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
-from photostrip.strip.gross_errors.control.control_deletion import ROUNDING
+from photostrip.strip.gross_errors.control_search import ROUNDING
 
 LEVEL = 1e-6  # of naming a reading where the control is read as it should be: a run fails because of it
 SEARCH_LEVEL = 0.01  # of taking anything out of sound control
@@ -47,6 +47,7 @@ LITTLE = 0.1  # of a principal distance: another certificate, or focus
 NEAR, STEPS = 1e-4, 20  # of a principal distance, within which it is found, and trials for it
 LEAST_FULL = 3  # full points that always fit
 LEAST_HEIGHTS = 2  # that are the same by chance
+ALIKE = 1e-6  # of the logarithm of a likelihood: rounding, where a similarity turns one reading into the other
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def find_reading(
         if tried is None or not tried.fits:
             continue
         cost = _cost(tried, way, unknowns, number)
-        if cost < least:
+        if cost < least - ALIKE:
             best, least = Better(reading=way, number=number, laid=tried), cost
     return best
 

@@ -21,24 +21,18 @@ from photostrip.notes import Finding
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
-from photostrip.pipeline.plausibility import (
-    control_layout,
-    evidence,
-    given_cameras,
-    given_control,
-)
+from photostrip.pipeline.plausibility import control_layout, evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.control_readings import find_distance
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images, of_units
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.plausibility import accepted
-from photostrip.plausibility.photos import flight, flight_order, identity, shared_ids, units
-from photostrip.plausibility.photos.shared_ids import OrientedRays
+from photostrip.plausibility import accepted, flight, flight_order, ids, units
+from photostrip.plausibility.ids import OrientedRays
 from photostrip.points import PhotoPoints
-from photostrip.strip.resection.collinearity import KnownPhotos
+from photostrip.strip.resection import KnownPhotos
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.plausibility.predicted import Predicted
+    from photostrip.pipeline.plausibility.given_control import Predicted
     from photostrip.pipeline.results import Bundle, Result, StripResult
     from photostrip.pipeline.strips.models import LinkedModels
 
@@ -132,8 +126,8 @@ def _of_data(
 
 def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment being done."""
-    from photostrip.pipeline.plausibility import predicted as by_result
-    from photostrip.pipeline.plausibility import shared_control  # a check has no adjusted strips
+    from photostrip.pipeline.plausibility import given_control as by_result
+    from photostrip.pipeline.plausibility import shared_errors
 
     inputs, settings = result.inputs, result.settings
     control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
@@ -175,16 +169,16 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         explained = {each.key for each in causes if each.key}
         findings = [each for each in findings if each.key not in explained] + causes
     shown = {each.strip.id for each in doubtful}
-    findings += shared_control.find_shared_errors(
+    findings += shared_errors.find_shared_errors(
         [each for each in stages if each.strip.id in shown], findings, joined=result.bundle is not None
     )
     if not any(each.is_error for each in findings):
-        findings += shared_control.find_shifted_checks(result)
+        findings += shared_errors.find_shifted_checks(result)
     return _told(findings, inputs, settings)
 
 
 def _causes(bundle: Bundle, inputs: Inputs) -> list[Finding]:
-    from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
+    from photostrip.pipeline.plausibility import shared_errors
 
     return list(shared_errors.of_bundle(bundle, inputs))
 
@@ -230,7 +224,7 @@ def _of_control(
     """Look at given coordinates: where they lie, how they go with each strip, and with it by single points."""
     if control is None:
         return []
-    copied = list(identity.find_copied_points(control.points, observations))
+    copied = list(ids.find_copied_points(control.points, observations))
     of_strips = [given_control.of_strip(control, each, settings) for each in formed]
     findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
@@ -244,9 +238,9 @@ def _of_unadjusted_models(
     """Look at strips of models of which there is no result."""
     if control is None:
         return ()
-    from photostrip.pipeline.plausibility import model_evidence  # strips of photos need none of it
+    from photostrip.pipeline.plausibility import control_layout
 
-    formed = list(model_evidence.form_strips(models, settings))
+    formed = list(control_layout.form_strips(models, settings))
     return accepted(_of_models(formed, models, control, settings, slips=True), settings.accept)
 
 
@@ -254,17 +248,17 @@ def _of_adjusted_models(
     result: Result, models: MeasuredModels, control: GivenControl | None, predicted: Predicted
 ) -> tuple[Finding, ...]:
     """Look at strips of models as they were adjusted."""
-    from photostrip.pipeline.plausibility import model_evidence, shared_control
-    from photostrip.pipeline.plausibility import predicted as by_result
+    from photostrip.pipeline.plausibility import control_layout, shared_errors
+    from photostrip.pipeline.plausibility import given_control as by_result
 
     if control is None:
         return ()
     settings = result.settings
-    formed = list(model_evidence.form_strips(models, settings))
+    formed = list(control_layout.form_strips(models, settings))
     findings = _of_models(formed, models, control, settings, slips=result.precision is None)
     if not any(each.is_error for each in findings):
         findings += by_result.of_result(result, predicted, control)
-        findings += shared_control.find_shifted_checks(result)
+        findings += shared_errors.find_shifted_checks(result)
     return accepted(findings, settings.accept)
 
 
@@ -272,14 +266,14 @@ def _of_models(
     formed: Sequence[LinkedModels], models: MeasuredModels, control: GivenControl, settings: Settings, *, slips: bool
 ) -> list[Finding]:
     """Look at strips of models: given points by themselves and in each strip, perspective centres."""
-    from photostrip.pipeline.plausibility import model_evidence
+    from photostrip.pipeline.plausibility import control_layout
 
     findings = [*control.findings]
     for each in formed:
         of_strip = given_control.of_strip(control, each, settings)
         findings += [*of_strip.whole, *(of_strip.slips if slips else ())]
-    for held in model_evidence.model_strips(formed, models.points.point_ids, control.points):
-        findings += flight.find_odd_centers(held.centers, held.depth, model_evidence.UP, held.photos, held.strip.id)
+    for held in control_layout.model_strips(formed, models.points.point_ids, control.points):
+        findings += flight.find_odd_centers(held.centers, held.depth, control_layout.UP, held.photos, held.strip.id)
         findings += control_layout.weak_layout_of_models(held, control)
     return findings
 
@@ -290,7 +284,7 @@ def _of_formed(each: FormedPhotos, observations: PhotoPoints) -> list[Finding]:
     sigma = np.median(observations.sigma)
     findings = units.find_wrong_sigmas(each.orientation.sigma0, sigma, strip.id)
     focal = strip.camera.principal_distance
-    findings += identity.find_double_ids(observations, formed, focal, strip.photos, strip.id, sigma)
+    findings += ids.find_double_ids(observations, formed, focal, strip.photos, strip.id, sigma)
     return findings
 
 
@@ -315,15 +309,14 @@ def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterab
     points = result.refined.observations
     if result.bundle is not None:
         rays, photos = _rays_of(result.bundle, points), result.bundle.block.problem.photo_ids
-        yield from shared_ids.find_shared_ids(rays, points.point_ids, photos)
+        yield from ids.find_shared_ids(rays, points.point_ids, photos)
         return
-    from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
-    from photostrip.plausibility.photos import tied_strips
+    from photostrip.pipeline.common_points import compared_strips
 
     for each in formed:
         yield from _shared_ids(each, points)
     for ties in compared_strips(tuple(stages), points.point_ids):
-        yield from tied_strips.find_shared_ids_of_strips(ties)
+        yield from ids.find_shared_ids_of_strips(ties)
 
 
 def _shared_ids(each: FormedPhotos, observations: PhotoPoints) -> Iterator[Finding]:
@@ -331,7 +324,7 @@ def _shared_ids(each: FormedPhotos, observations: PhotoPoints) -> Iterator[Findi
     strip, formed, o = each.strip, each.formed, observations
     photos = strip.oriented(formed.centers, formed.rotations)
     rays = OrientedRays.of_strip(photos, strip.positions(o), o.point, o.xy, o.sigma)
-    return shared_ids.find_shared_ids(rays, o.point_ids, strip.photos, (strip.id,))
+    return ids.find_shared_ids(rays, o.point_ids, strip.photos, (strip.id,))
 
 
 def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:

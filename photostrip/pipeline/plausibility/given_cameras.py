@@ -20,9 +20,8 @@ from photostrip.notes import Finding
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.pipeline.inputs import GivenOrientations, Inputs, Strip
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.plausibility import found
-from photostrip.plausibility.photos import flight
-from photostrip.plausibility.photos import rotations as given_angles
+from photostrip.plausibility import flight, found
+from photostrip.plausibility import flight as given_angles
 from photostrip.points import ControlPoints, PhotoPoints, locate
 
 LEAST_POINTS = 3  # points that carry a similarity

@@ -2,7 +2,7 @@
 
 The errors of a strip by those of its image coordinates are known, all of them together, so that a strip which bends as
 they let it contradicts nothing. Under each reading the strip is laid on its control by a similarity, and what no other
-control predicts is taken out, as a run with polynomials does (``control_deletion``). Points far away from all others
+control predicts is taken out, as a run with polynomials does (``control_search``). Points far away from all others
 are predicted and take no part.
 """
 
@@ -26,12 +26,10 @@ from photostrip.pipeline.strips import models, photos_on_control
 from photostrip.pipeline.strips.absolute import OrientedStrip, strip_at_control
 from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.plausibility.control.given_points import far_away
+from photostrip.plausibility.given_points import far_away
 from photostrip.points import ControlPoints
-from photostrip.strip.error_propagation.strip_at_control import StripAtControl
-from photostrip.strip.gross_errors.control.control_deletion import JointAdjustment, adjust
-from photostrip.strip.gross_errors.control.control_rejections import FoundErrors, kept_of
-from photostrip.strip.gross_errors.control.control_screening import BENT, first_search, majority, search
+from photostrip.strip.gross_errors.control_screening import BENT, FoundErrors, first_search, kept_of, majority, search
+from photostrip.strip.gross_errors.control_search import JointAdjustment, StripAtControl, adjust
 
 MOST_POINTS = 60  # control points that are looked at together: of more some are drawn, evenly along the strip
 AS_FORMED = Similarity(1.0, np.eye(3), np.zeros(3))

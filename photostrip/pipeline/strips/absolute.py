@@ -20,10 +20,9 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ControlPoints
-from photostrip.strip import absolute_orientation
-from photostrip.strip.error_propagation import control_errors
-from photostrip.strip.error_propagation.control_errors import Misclosures
-from photostrip.strip.error_propagation.strip_at_control import ControlRay, StripAtControl
+from photostrip.strip import absolute_orientation, fitted_strip
+from photostrip.strip.fitted_strip import Misclosures
+from photostrip.strip.gross_errors.control_search import ControlRay, StripAtControl
 from photostrip.strip.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class OrientedStrip:
     def misclosures(self) -> Misclosures:
         """Control coordinates that count."""
         turned = self.targets.turned(self.at_control)
-        return control_errors.misclosures(turned, self.control_rows, self.absolute.axes)
+        return fitted_strip.misclosures(turned, self.control_rows, self.absolute.axes)
 
 
 def strip_at_control(

@@ -20,7 +20,7 @@ from photostrip.errors import GeometryError
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.strips.photos import form_strip
-from photostrip.plausibility.photos import mosaic
+from photostrip.plausibility import mosaic
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS

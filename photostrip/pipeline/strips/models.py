@@ -13,25 +13,22 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
+from photostrip.network.adjustment import BundleSolution, solve
 from photostrip.network.cofactors import joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
-from photostrip.network.solution import BundleSolution
-from photostrip.network.solve import solve
 from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.overruling import rows_of_models
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, strip_at_control, to_ground
-from photostrip.pipeline.strips.model_notes import link_notes
+from photostrip.pipeline.strips.notes import link_notes
 from photostrip.points import ControlPoints, ModelPoints, locate, take_rows
 from photostrip.strip import absolute_orientation
-from photostrip.strip.gross_errors.control import control_screening
-from photostrip.strip.independent_models import link_screening, linking, perspective_centers
+from photostrip.strip.gross_errors import control_screening
+from photostrip.strip.independent_models import formation, linking
 from photostrip.strip.independent_models.formation import FormedModels, form_from_models, require_links
-from photostrip.strip.independent_models.link_screening import ScreenedLinks
-from photostrip.strip.independent_models.linking import StripModels
-from photostrip.strip.independent_models.settings import LinkSettings
-from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.independent_models.linking import LinkSettings, ScreenedLinks, StripModels
+from photostrip.strip.polynomial import Polynomial
 from photostrip.units import MILLIMETRES
 
 OVER = np.array([1.0, -1.0, -1.0])  # turns a strip by 180 degrees about its X axis
@@ -146,8 +143,8 @@ def _refuse_other_hand(oriented: OrientedStrip) -> None:
     targets = oriented.targets.of(xyz)[full]
     as_it_is, mirrored = linking.either_hand(xyz[full], targets)
     expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread.plan**2 + spread.height**2).sum()
-    conspicuous = as_it_is > link_screening.CONSPICUOUS * expected
-    if conspicuous and mirrored < link_screening.REFLECTED * as_it_is:
+    conspicuous = as_it_is > linking.CONSPICUOUS * expected
+    if conspicuous and mirrored < linking.REFLECTED * as_it_is:
         raise _left_handed(oriented.strip)
 
 
@@ -239,7 +236,7 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, code=error.code) from error
     kept = rows_of_models(settings.links.keep, measured)[models.row]
-    links = link_screening.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
+    links = linking.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
     _refuse_reflected(strip, links)
     photos = locate(strip.photos, measured.photo_ids)
     return form_from_models(models, links, np.where(photos < 0, -1, photos + len(measured.point_ids)))
@@ -304,7 +301,7 @@ def _centers(formed: FormedModels, similarity: Similarity, correction: Polynomia
     if correction is None or not known.any():
         return placed
     found, axes = placed[known], correction.axes
-    above = perspective_centers.heights_above(found, similarity(formed.xyz))
-    rows = perspective_centers.displacement_rows(found, above, [axis.terms for axis in axes])
+    above = formation.heights_above(found, similarity(formed.xyz))
+    rows = formation.displacement_rows(found, above, [axis.terms for axis in axes])
     placed[known] = found + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
     return placed

@@ -1,33 +1,127 @@
-"""A strip of photos: its pairs oriented, its models joined."""
+"""A strip of photos: its pairs oriented, its models joined, its rays tested all at once.
+
+It is formed again without the wrong rays.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import Similarity
-from photostrip.network.gross_errors.strip_rays import StripRays
+from photostrip.network.strip_rays import StripRays
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages
-from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
 from photostrip.points import PhotoPoints
-from photostrip.rejection import Rejection
-from photostrip.strip import absolute_orientation
-from photostrip.strip.error_propagation.strip_errors import StripErrors, differentiate_strip
-from photostrip.strip.gross_errors.pairs import screening
+from photostrip.rejection import SEVERAL_RAYS, Rejection
+from photostrip.strip import absolute_orientation, ray_intersection
+from photostrip.strip.gross_errors import pair_screening
 from photostrip.strip.relative_orientation.orientation import (
     Orientation,
     RelativeSettings,
+    orient_again,
     orient_unchecked,
     refuse_unusable,
 )
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.strip_formation.strip import FormedStrip, form_from_pairs, without_points
+from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs
+from photostrip.strip.strip_errors import StripErrors, differentiate_strip
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.strip_formation.strip import (
+    NOTHING_GIVEN,
+    FirstPhoto,
+    FormedStrip,
+    form_from_pairs,
+    without_points,
+    without_rows,
+)
+
+
+class ScreenedFormation(NamedTuple):
+    """A strip without what its rays contradict."""
+
+    orientation: Orientation
+    formed: FormedStrip
+    rejections: tuple[Rejection, ...]  # rays that must not be used, rows of the observations
+    tested: bool = True  # False where the rays that were left could not be adjusted together
+
+
+def form_screened(
+    of_pairs: Orientation,
+    rays: StripRays,
+    photos: Sequence[str],
+    settings: StripFormationSettings,
+    *,
+    readmit: bool,
+    first: FirstPhoto = NOTHING_GIVEN,
+    point_weight: Floats | None = None,
+) -> ScreenedFormation:
+    """Form a strip, leave out what its rays contradict, take back what they confirm, and form it again.
+
+    Where pairs and junctions had nothing to reject, nothing is looked for.
+
+    readmit: whether points that a pair rejected may be taken back.
+    first, point_weight: as in ``form_from_pairs``.
+    """
+    formed = form_from_pairs(of_pairs, settings, photos, rays.sigma, first=first, point_weight=point_weight)
+    if of_pairs.used.all() and formed.junctions.used.all():
+        return ScreenedFormation(of_pairs, formed, ())
+    from photostrip.network.strip_rays import wrong_rays
+
+    found = wrong_rays(of_pairs, formed, rays)
+    if found is None:
+        return ScreenedFormation(of_pairs, formed, (), tested=False)
+    used, aside = _uses(of_pairs, found, readmit=readmit)
+    changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
+    oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
+    try:
+        formed = form_from_pairs(
+            oriented, settings, photos, rays.sigma, aside, searched=True, first=first, point_weight=point_weight
+        )
+    except GeometryError:
+        oriented = of_pairs  # nothing would join two models: what joined them before stays
+    formed = without_rows(formed, oriented, aside)
+    return ScreenedFormation(oriented, _bridged(formed, oriented, rays, photos, found), found)
+
+
+def _bridged(
+    formed: FormedStrip, oriented: Orientation, rays: StripRays, photos: Sequence[str], found: Sequence[Rejection]
+) -> FormedStrip:
+    """Add the points whose good rays come from photos that are no neighbours."""
+    rows = oriented.rows[~np.isin(oriented.point, formed.point)]
+    good = np.unique(rows[~np.isin(rows, np.array([each.row for each in found], np.intp))])
+    if not len(good):
+        return formed
+    return ray_intersection.bridge(formed, rays.observations, photos, oriented.pairs.focal, good)
+
+
+def _uses(of_pairs: Orientation, found: Sequence[Rejection], *, readmit: bool) -> tuple[Flags, Flags]:
+    """Rows of the pairs' table that orient their pair, and those of them that must not place their point.
+
+    Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
+    y parallaxes are good, its place is not. Pairs that would have fewer than five points keep those of their own
+    search; the strip has redundancy where a pair of five has none.
+    """
+    wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
+    wrong[[each.row for each in found]] = True
+    unclear[[each.row for each in found if each.cause == SEVERAL_RAYS]] = True
+    gone, aside = (np.asarray(each[of_pairs.rows].any(axis=1), bool) for each in (wrong, unclear))
+    used = np.where(aside | (not readmit), of_pairs.used & (aside | ~gone), ~gone)
+    pairs = of_pairs.pairs
+    left, had = (pairs.sums(each.astype(float)) for each in (used, of_pairs.used))
+    poor = (left < np.minimum(MINIMUM_POINTS, had))[pairs.pair]
+    return np.where(poor, of_pairs.used, used), aside
+
+
+def with_readmitted(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection, ...]:
+    """Mark the rejections of pairs that the strip took back; ``used`` (m,) are the rows used in the end."""
+    return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +131,7 @@ class FormedPhotos:
     strip: Strip
     observations: PhotoPoints  # ideal image coordinates of the whole project
     sigma: float  # median standard deviation of the strip's image coordinates, mm
-    screened: screening.ScreenedPairs  # the search for gross errors in its pairs
+    screened: pair_screening.ScreenedPairs  # the search for gross errors in its pairs
     formed: FormedStrip
     wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
     rays_tested: bool = True  # whether those rays could be searched for
@@ -111,12 +205,12 @@ class FormedPhotos:
 
 def screened_pairs(
     strip: Strip, observations: PhotoPoints, settings: RelativeSettings
-) -> tuple[screening.ScreenedPairs, Floats]:
+) -> tuple[pair_screening.ScreenedPairs, Floats]:
     """Orient pairs, those among them that cannot be used, without what is wrong in them; and their weights before."""
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     pairs = pairs.without(overruling.touched(settings.drop, observations, pairs.rows))
     first, converged = orient_unchecked(pairs)
-    screened = screening.screen_pairs(first, settings, strip.median_sigma(observations), converged)
+    screened = pair_screening.screen_pairs(first, settings, strip.median_sigma(observations), converged)
     kept = overruling.touched(settings.keep, observations, pairs.rows)
     return overruling.restored(screened, pairs.weight, kept), pairs.weight
 
@@ -145,7 +239,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             stated=sigma,
             kept=overruling.rows(settings.relative.keep, observations),
         )
-        readmit = settings.relative.screening in screening.SEARCHES
+        readmit = settings.relative.screening in pair_screening.SEARCHES
         oriented, formed, wrong, tested = form_screened(
             oriented,
             rays,

@@ -20,19 +20,16 @@ from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, strip_at_control, to_ground
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
+from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights, find_shared
 from photostrip.points import ControlPoints
-from photostrip.strip import absolute_orientation
-from photostrip.strip.error_propagation import control_errors, strip_errors
-from photostrip.strip.error_propagation.control_errors import FitOperator
-from photostrip.strip.error_propagation.strip_at_control import ControlRay
-from photostrip.strip.error_propagation.strip_errors import StripErrors
-from photostrip.strip.gross_errors.control import control_screening
-from photostrip.strip.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
-from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
-from photostrip.strip.polynomial.correction import Polynomial
-from photostrip.strip.resection.collinearity import depths
-from photostrip.strip.resection.resection import Resection, resect
+from photostrip.strip import absolute_orientation, fitted_strip, strip_errors
+from photostrip.strip.fitted_strip import FitOperator
+from photostrip.strip.gross_errors import control_screening
+from photostrip.strip.gross_errors.control_screening import EITHER, WRONG_IMAGE, ScreenedControl
+from photostrip.strip.gross_errors.control_search import ControlRay
+from photostrip.strip.polynomial import Polynomial
+from photostrip.strip.resection import Resection, depths, resect
+from photostrip.strip.strip_errors import StripErrors
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +48,7 @@ class OrientedPhotos:
     def fit(self, terms: Sequence[tuple[str, ...]]) -> FitOperator:
         """Operator of the similarity and of polynomials of these terms for X, Y, Z, with the weights in force."""
         on = self.oriented
-        return control_errors.fit_operator(on.misclosures, on.weights, on.at_control, terms, self.errors.origin)
+        return fitted_strip.fit_operator(on.misclosures, on.weights, on.at_control, terms, self.errors.origin)
 
     def misclosure_covariance(self) -> Callable[[Numbers], Floats]:
         """Covariance of any misclosures at the control, strip and control together, metres^2."""

@@ -23,9 +23,8 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
-from photostrip.pipeline.inputs import BUNDLE, Strip
+from photostrip.pipeline.inputs import BUNDLE, Strip, require_whole
 from photostrip.pipeline.plausibility import gate
-from photostrip.pipeline.refusals import require_whole
 from photostrip.points import PhotoPoints, locate
 from photostrip.project.checks.models import (
     counts_of_models,

@@ -12,10 +12,11 @@ import numpy as np
 from photostrip.errors import InputError
 from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
-from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
+from photostrip.project.plans.flown import Percent, SigmaUm
 from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
-from photostrip.project.schema.values import Id, Number, Positive, Range, Words, bounded, one_of
+from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
+from photostrip.project.schema.values import FirstSchema, Id, Number, Positive, Range, Words, bounded
+from photostrip.project.yaml.reading import read_keys
 from photostrip.units import MICROMETRES
 
 Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
@@ -37,12 +38,12 @@ class PlanCamera(Section):
     base: Positive | None = key("Photo base; default: from `format` and the overlap", None, unit="mm")
     format: tuple[Positive, Positive] | None = key("Length along and width across the flight", None, unit="mm")
 
-    @Rule
+    @rule
     def _has_a_base(self) -> None:
         if self.base is None and self.format is None:
             raise wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
 
-    @Rule
+    @rule
     def _has_one_precision(self) -> None:
         if (self.sigma_um is None) == (self.image_sigma_um is None):
             what = "nothing says" if self.sigma_um is None else "two keys say"
@@ -63,7 +64,7 @@ class PlanCamera(Section):
 class CameraPlanFile(Section):
     """Cameras to compare."""
 
-    photostrip_plan_cameras: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_cameras: FirstSchema = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the comparison", "cameras")
     end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
@@ -74,9 +75,9 @@ class CameraPlanFile(Section):
     relief: Relief = key("Difference between the highest and the lowest ground", 0.0, unit="m")
     slope_deg: Slope = key("Steepest slope that is to be seen", 0.0, unit="deg")
     reference: Id | None = key("Camera that the others stand beside; default: the last", None)
-    cameras: Annotated[dict[Id, PlanCamera], Length(1)] = key("Cameras by name")
+    cameras: Annotated[dict[Id, PlanCamera], length(1)] = key("Cameras by name")
 
-    @Rule
+    @rule
     def _reference_is_there(self) -> None:
         if self.reference is not None and self.reference not in self.cameras:
             expected = f"one of {', '.join(self.cameras)}"
@@ -89,7 +90,7 @@ class CameraPlanFile(Section):
             message = f"camera `{lacking}` has no format, and others have: areas cannot be compared"
             raise wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
 
-    @Rule
+    @rule
     def _flown_one_way(self) -> None:
         given = [name for name in FLOWN if getattr(self, name) is not None]
         if len(given) > 1:
@@ -115,7 +116,7 @@ class CameraPlan(NamedTuple):
 
 def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     """Read a list of cameras to compare, or raise every fault of it."""
-    given, reading = read_plan(CameraPlanFile, path, assignments)
+    given, reading = read_keys(CameraPlanFile, path, assignments)
     cameras = tuple(_plan_camera(str(name), each, given) for name, each in given.cameras.items())
     named = {camera.name: camera for camera in cameras}
     return CameraPlan(

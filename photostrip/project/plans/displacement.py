@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
-from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
-from photostrip.project.schema.values import Fraction, Number, Range, Words, bounded, one_of
-from photostrip.project.terrestrial.cameras import Distance, Size
-from photostrip.project.terrestrial.options import chosen_camera, required_format
+from photostrip.project.plans.flown import SigmaUm
+from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
+from photostrip.project.schema.values import FirstSchema, Fraction, Number, Range, Words, bounded, one_of
+from photostrip.project.terrestrial.cameras import Camera, CameraOrName, only_camera
 from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
-from photostrip.terrestrial.forecast import DisplacementSpec
+from photostrip.project.yaml.reading import read_keys
+from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import MICROMETRES
 
 PRESET = "UMK 10/1318"
@@ -27,13 +26,13 @@ Metres = Annotated[Number, After(bounded(DISTANCE))]
 class DisplacementPlanFile(Section):
     """Expected accuracy of displacements. Every key but the first has a default."""
 
-    photostrip_plan_displacement: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_displacement: FirstSchema = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "displacements")
-    camera: Words = key("Name of a camera of the list", PRESET)
+    camera: CameraOrName = key(
+        "Camera: its name in a list, or preset, principal_distance, format", Camera(preset=PRESET)
+    )
     presets: Words | None = key("A list of cameras of your own", None)
-    principal_distance: Distance | None = key("Principal distance, instead of that of the list", None, unit="mm")
-    format: Size | None = key("Width and height of the photo, likewise", None, unit="mm")
     stations: Annotated[Words, After(one_of("2", "1"))] = key(
         "2, at the ends of a base, or 1, with known distances", "2"
     )
@@ -41,7 +40,7 @@ class DisplacementPlanFile(Section):
     convergence_deg: Annotated[Number, After(bounded(CONVERGENCE))] = key(
         "Turn of each camera towards the other", 0.0, unit="deg"
     )
-    distances: Annotated[list[Metres], Length(1, 50)] = key(
+    distances: Annotated[list[Metres], length(1, 50)] = key(
         "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
     )
     sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
@@ -53,7 +52,7 @@ class DisplacementPlanFile(Section):
         "Probability with which the displacements stated are found", DisplacementSpec.power
     )
 
-    @Rule
+    @rule
     def _one_precision(self) -> None:
         if self.sigma_um is not None and self.sigma_d_um is not None:
             message = "the standard deviation of a coordinate and that of a pseudo-parallax are both given"
@@ -70,12 +69,8 @@ class DisplacementPlan(NamedTuple):
 
 def load_displacement_plan(path: Path | None, assignments: Sequence[str]) -> DisplacementPlan:
     """Read the plan of a survey, or raise its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(DisplacementPlanFile, path, assignments)
-    presets = None if given.presets is None else str(given.presets)
-    camera = chosen_camera(camera=str(given.camera), presets=presets, principal_distance=given.principal_distance)
-    if given.format is not None:
-        camera = replace(camera, format=given.format)
-    required_format(camera)
+    given, reading = read_keys(DisplacementPlanFile, path, assignments)
+    camera = only_camera(given.camera, reading, whole=True)
     change = given.sigma_d_um or 5.0
     if given.sigma_um is not None:
         change = float(np.sqrt(2.0)) * given.sigma_um  # of a coordinate in two epochs

@@ -1,35 +1,16 @@
-"""What the files of all plans have in common: how they are read, and what is flown.
-
-A file is not needed: every key has a default or can be set on the command line, whose options are assignments to
-these keys.
-"""
+"""What plans of something flown have in common."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from photostrip.camera import Camera
-from photostrip.formats.text.findings import Findings
-from photostrip.planning.strip.ideal_strip import StripGeometry
-from photostrip.project.schema.sections import After, Rule, Section, key, wrong
+from photostrip.planning.ideal_strip import StripGeometry
+from photostrip.project.schema.sections import After, Section, key, rule, wrong
 from photostrip.project.schema.values import Positive, Range, Triple, Words, bounded
 from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
-from photostrip.project.yaml.reading import Reading
-from photostrip.project.yaml.tree import COMMAND_LINE, Node, Place
 
-T = TypeVar("T", bound=Section)
-
-SCHEMA_NUMBER = "1"
-NUMBER_KEYS = {
-    "photostrip_plan_model",
-    "photostrip_plan_strip",
-    "photostrip_plan_cameras",
-    "photostrip_plan_displacement",
-    "photostrip_plan_screening",
-}
 OVERLAP = Range(1.0, 99.0, "%")
 
 Percent = Annotated[Positive, After(bounded(OVERLAP))]
@@ -56,7 +37,7 @@ class Flown(Section):
     flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
     image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
 
-    @Rule
+    @rule
     def _one_scale(self) -> None:
         if self.scale is not None and self.flying_height is not None:
             raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
@@ -65,15 +46,3 @@ class Flown(Section):
         """Denominator of the photo scale, given itself or by the flying height."""
         by_height = (self.flying_height or 0.0) / camera.principal_distance * 1000.0
         return self.scale or by_height or StripGeometry.scale
-
-
-def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, Reading]:
-    """Read a plan file, or make one of assignments alone, or raise every fault."""
-    if path is None:
-        place, number = Place(COMMAND_LINE), next(name for name in kind.keys if name in NUMBER_KEYS)
-        root = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
-        reading = Reading(file=COMMAND_LINE, root=root, findings=Findings(), files=[])
-    else:
-        reading = Reading.of(str(path))
-    reading = reading.with_set(assignments)
-    return reading.read(kind), reading

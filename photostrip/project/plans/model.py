@@ -6,12 +6,24 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from photostrip.errors import Fault, InputError
-from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
-from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
-from photostrip.project.schema.values import Id, Number, Pair, Positive, Range, Triple, Whole, Words, bounded, one_of
+from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
+from photostrip.project.plans.flown import Flown, Sigmas
+from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
+from photostrip.project.schema.values import (
+    FirstSchema,
+    Id,
+    Number,
+    Pair,
+    Positive,
+    Range,
+    Triple,
+    Whole,
+    Words,
+    bounded,
+    one_of,
+)
 from photostrip.project.simulation import camera_of
+from photostrip.project.yaml.reading import read_keys
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
 USES = ("xyz", "xy", "z")
@@ -81,10 +93,21 @@ class Grid(Section):
     rows: Annotated[Whole, After(bounded(GRID))] = key("Points across the flight", ModelSpec.grid[1])
 
 
+def _listed(value: object) -> object:
+    """Let a list stand for the five elements."""
+    if not isinstance(value, list):
+        return value
+    names = list(ElementErrors.model_fields)
+    if len(value) != len(names):
+        expected = "five: dby, dbz (um), dkappa, dalpha, domega (seconds of arc)"
+        raise wrong(f"{len(value)} values are given", code="number", expected=expected)
+    return dict(zip(names, value, strict=True))
+
+
 class ModelPlanFile(Flown):
     """Expected errors over one model. Every key but the first has a default."""
 
-    photostrip_plan_model: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_model: FirstSchema = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "model")
     base: Positive | None = key("Photo base, instead of the overlap", None, unit="mm")
     reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
@@ -94,9 +117,15 @@ class ModelPlanFile(Flown):
     control: ModelControl = key("Control", ModelControl())
     grid: Grid = key("Where errors are computed", Grid())
     points: list[ModelPoint] = key("Further points, with names and heights", [])
-    element_errors: ElementErrors = key("Given errors of the elements", ElementErrors())
+    element_errors: Annotated[ElementErrors, Before(_listed)] = key(
+        "Given errors of the elements: by name, or [dby, dbz, dkappa, dalpha, domega]", ElementErrors()
+    )
+    closed_form: Annotated[Words, After(one_of("no", "yes", "printed"))] = key(
+        "Operators and closed form side by side, with c1 to c15; `printed`: as the source prints it, misprints and all",
+        "no",
+    )
 
-    @Rule
+    @rule
     def _errors_or_misclosures(self) -> None:
         measured = [point for point in self.control.points if point.misclosure is not None]
         if not measured:
@@ -106,11 +135,11 @@ class ModelPlanFile(Flown):
             raise wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
         every: list[ModelPoint] = [*self.control.points, *self.points]
         made = [point for point in every if any(point.measured_error)]
-        if made or any(any(point.given_error) for point in measured) or any(self.element_errors.values().values()):
+        if made or any(any(point.given_error) for point in measured) or any(dict(self.element_errors).values()):
             message = "misclosures that were found, and errors that would make some, are both given"
             raise wrong(message, code="two-keys", at="control", fix="remove the one or the other")
 
-    @Rule
+    @rule
     def _points_are_seen(self) -> None:
         camera = camera_of(self.camera)
         flying_height = self.scale_of(camera) * camera.principal_distance / MILLIMETRES
@@ -121,28 +150,17 @@ class ModelPlanFile(Flown):
                 raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
 
 
-ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.keys)
-
-
-def elements_option(text: str | None) -> dict[str, str]:
-    """Split the five errors of ``--elements`` into keys and values."""
-    values = [] if text is None else text.split(",")
-    if values and len(values) != len(ELEMENT_KEYS):
-        message = f"{len(values)} values are given; the elements are five: dby, dbz, dkappa, dalpha, domega"
-        raise InputError(Fault(message, "number", key="--elements"))
-    return dict(zip(ELEMENT_KEYS, map(str.strip, values), strict=False))
-
-
 class ModelPlan(NamedTuple):
     name: str
     camera: str
     spec: ModelSpec
+    closed_form: str  # ``no``, ``yes`` or ``printed``
     files: Sequence[str]
 
 
 def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
     """Read the plan of a model, or raise all its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(ModelPlanFile, path, assignments)
+    given, reading = read_keys(ModelPlanFile, path, assignments)
     camera = camera_of(given.camera)
     along, across = camera.format or (230.0, 230.0)
     base = given.base or along * (1.0 - given.end_lap_percent / 100.0)
@@ -166,7 +184,9 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
         ),
         element_errors=_elements(given.element_errors),
     )
-    return ModelPlan(name=str(given.name), camera=camera.name, spec=spec, files=reading.files)
+    return ModelPlan(
+        name=str(given.name), camera=camera.name, spec=spec, closed_form=str(given.closed_form), files=reading.files
+    )
 
 
 def _control_of(point: ModelControlPoint, number: int) -> ControlPoint:

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
-from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
-from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
+from photostrip.project.plans.flown import SigmaUm
+from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
 from photostrip.project.schema.values import (
+    FirstSchema,
     Fraction,
     NotNegative,
     Number,
@@ -19,8 +20,8 @@ from photostrip.project.schema.values import (
     Words,
     bounded,
     choice,
-    one_of,
 )
+from photostrip.project.yaml.reading import read_keys
 from photostrip.strip.relative_orientation.orientation import SCREENINGS
 
 MICROMETRES = 1000.0  # in a millimetre
@@ -37,7 +38,7 @@ Count = Annotated[Whole, After(bounded(POINTS))]
 class ScreeningPlanFile(Section):
     """An experiment with gross errors in pairs; the defaults are the published one."""
 
-    photostrip_plan_screening: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_screening: FirstSchema = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "screening")
     principal_distance: Annotated[Number, After(bounded(FOCAL))] = key(
@@ -45,7 +46,7 @@ class ScreeningPlanFile(Section):
     )
     base: Size = key("Photo base", USUAL.layout.base, unit="mm")
     width: Size = key("Distance of the side zones from the base", USUAL.layout.width, unit="mm")
-    zone_points: Annotated[list[Count], Length(ZONES, ZONES)] = key(
+    zone_points: Annotated[list[Count], length(ZONES, ZONES)] = key(
         "Points in each of the standard zones 1 to 6", list(USUAL.layout.counts)
     )
     zone_reach: NotNegative = key(
@@ -62,10 +63,10 @@ class ScreeningPlanFile(Section):
     second_errors: Annotated[Whole, After(bounded(Range(0, 1000, "")))] = key(
         "Pairs of them that have a second one", USUAL.second
     )
-    error_sizes_um: Annotated[list[Positive], Length(1, 20)] = key(
+    error_sizes_um: Annotated[list[Positive], length(1, 20)] = key(
         "Sizes of the errors, each as often as any other", [MICROMETRES * size for size in USUAL.sizes], unit="um"
     )
-    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], Length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], length(1)] = key(
         "Methods, of `processing.relative.screening`", list(USUAL.methods)
     )
     grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL.grubbs_alpha)
@@ -75,7 +76,7 @@ class ScreeningPlanFile(Section):
     )
     seed: Whole = key("Number that makes the drawn pairs and errors the same again", USUAL.seed)
 
-    @Rule
+    @rule
     def _errors_have_pairs(self) -> None:
         if self.second_errors > self.models:
             message = f"{self.second_errors} second errors do not go into {self.models} pairs"
@@ -90,7 +91,7 @@ class ScreeningPlan(NamedTuple):
 
 def load_screening_plan(path: Path | None, assignments: Sequence[str]) -> ScreeningPlan:
     """Read the plan of an experiment, or raise its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(ScreeningPlanFile, path, assignments)
+    given, reading = read_keys(ScreeningPlanFile, path, assignments)
     layout = PairLayout(
         focal=given.principal_distance,
         base=given.base,

@@ -8,15 +8,23 @@ from pathlib import Path
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.planning.strip.design import DesignReport, DesignTask, plan_strip
-from photostrip.planning.strip.ideal_strip import LAYOUTS, LEAST_PHOTOS, USES, ControlLayout, Spot, StripGeometry
-from photostrip.planning.strip.methods import BUNDLE, METHODS
-from photostrip.planning.strip.placement import Demand, Placement
-from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, read_section, wrong
-from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of
+from photostrip.planning.ideal_strip import (
+    BUNDLE,
+    LAYOUTS,
+    LEAST_PHOTOS,
+    METHODS,
+    USES,
+    ControlLayout,
+    Spot,
+    StripGeometry,
+)
+from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
+from photostrip.project.plans.flown import Flown, Sigmas
+from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
+from photostrip.project.schema.values import FirstSchema, Flag, Id, Positive, Range, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
-from photostrip.project.yaml.reading import Reading
+from photostrip.project.yaml.reading import Reading, read_keys
+from photostrip.project.yaml.validation import valid_section
 from photostrip.simulation import Points
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
@@ -62,11 +70,23 @@ def _layout(value: object) -> object:
     return {name.strip(): number.strip()} if equals else {"layout": value}
 
 
-def layout_option(word: str) -> tuple[str, str]:
-    """Return the key and the value that add a layout to a plan: for ``bands=3`` ``layouts."3 bands"`` and the word."""
+def _layouts(value: object) -> object:
+    """Let a list of words stand for layouts, each by a name of its own: ``3 bands``, ``every 5``, ``corners``."""
+    if not isinstance(value, list):
+        return value
+    return {_layout_name(str(word)): word for word in value}
+
+
+def _layout_name(word: str) -> str:
     kind, equals, number = word.partition("=")
-    name = f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
-    return f'layouts."{name if equals else word}"', f'"{word}"'
+    if not equals:
+        return word
+    return f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
+
+
+def _required(value: object) -> object:
+    """Let a pair stand for plan and height."""
+    return dict(zip(("plan", "height"), value, strict=False)) if isinstance(value, list) else value
 
 
 class StripLayout(Section):
@@ -90,9 +110,9 @@ class StripLayout(Section):
     )
     gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
 
-    @Rule
+    @rule
     def _one_way_to_space_bands(self) -> None:
-        if self.every is not None and "bands" in self.given:
+        if self.every is not None and "bands" in self.model_fields_set:
             raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
 
 
@@ -115,7 +135,7 @@ class StripPlacement(Section):
 class StripPlanFile(Flown):
     """A strip and layouts of its control. Every key but the first has a default."""
 
-    photostrip_plan_strip: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_strip: FirstSchema = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "strip")
     models: Annotated[Whole, After(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
     points: StripPoints = key("Pass points", StripPoints())
@@ -125,16 +145,20 @@ class StripPlanFile(Flown):
         None,
         unit="m",
     )
-    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], Length(1)] | None = key(
-        f"Layouts by name; a word may stand for one. Default: {', '.join(DEFAULT_LAYOUTS)}", None
+    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], Before(_layouts), length(1)] | None = key(
+        "Layouts by name, where a word may stand for one, or a list of words: `[bands=3, every=5, corners]`."
+        f" Default: {', '.join(DEFAULT_LAYOUTS)}",
+        None,
     )
-    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], Length(1)] = key(
+    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], length(1)] = key(
         f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
     )
-    required: StripRequired = key("Accuracy that every point must reach", StripRequired())
+    required: Annotated[StripRequired, Before(_required)] = key(
+        "Accuracy that every point must reach, or [plan, height]", StripRequired()
+    )
     place: StripPlacement | None = key("Further points to be placed as well as possible", None)
 
-    @Rule
+    @rule
     def _names_and_methods_fit(self) -> None:
         into = self.place.into if self.place is not None else None
         names = list(self.layouts or DEFAULT_LAYOUTS)
@@ -162,7 +186,7 @@ class StripPlan:
 
 def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     """Read the plan of a strip, or raise all its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_plan(StripPlanFile, path, assignments)
+    given, reading = read_keys(StripPlanFile, path, assignments)
     camera = camera_of(given.camera)
     geometry = StripGeometry(
         camera=camera,
@@ -177,7 +201,7 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
         ),
         image_sigma=given.image_sigma_um / 1000.0,
     )
-    usual = {name: read_section(StripLayout, _layout(word), []) for name, word in DEFAULT_LAYOUTS.items()}
+    usual = {name: valid_section(StripLayout, _layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
     chosen = [(name, each) for name, each in (given.layouts or usual).items() if each is not None]
     layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
     if given.gnss is not None:

@@ -73,7 +73,7 @@ class Members(Section):
 
 def _usual(kind: type[T], usual: Tolerance | SetTolerance) -> T:
     """Return a section that holds the defaults."""
-    return kind(**{name: getattr(usual, name) for name in kind.keys})
+    return kind.model_construct(**{name: getattr(usual, name) for name in kind.model_fields})
 
 
 class ToleranceFile(Section):
@@ -104,5 +104,4 @@ def load_tolerances(path: Path) -> tuple[Tolerances, Sequence[str]]:
 
 def _completed(usual: Tolerance | SetTolerance, given: Section) -> Any:  # noqa: ANN401 (the type of `usual`)
     """Lay what is given over the default."""
-    named = {name: getattr(given, name) for name in type(given).keys}
-    return replace(usual, **{name: value for name, value in named.items() if value is not None})
+    return replace(usual, **{name: value for name, value in given if value is not None})

@@ -2,11 +2,13 @@
 
 from typing import Annotated
 
+from pydantic import Discriminator, Tag
+
 from photostrip import camera
 from photostrip.errors import InputError
 from photostrip.network.settings import ASKED
 from photostrip.project.schema.ground import Angles
-from photostrip.project.schema.sections import Before, Length, Read, Rule, Section, key, wrong
+from photostrip.project.schema.sections import Before, Read, Section, key, length, rule, wrong
 from photostrip.project.schema.values import (
     Id,
     Number,
@@ -21,7 +23,7 @@ from photostrip.project.schema.values import (
     single,
 )
 from photostrip.strip.image_coordinates import pixel_cameras
-from photostrip.strip.image_coordinates.certificate import PLACES
+from photostrip.strip.image_coordinates.fiducial_marks import PLACES
 from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PIXEL_SIZE
 
 Place = Annotated[str, choice(tuple(PLACES))]
@@ -60,11 +62,11 @@ class Distortion(Section):
     radius: list[Number] = key("Radial table: ascending distances from the principal point", [], unit="mm")
     distortion: list[Number] = key("Radial table: distortion at these distances, outwards positive", [], unit="mm")
 
-    @Rule
+    @rule
     def _one_model(self) -> None:
         table = self.model == "radial-table"
         for name in ("k", "p", "b") if table else ("radius", "distortion"):
-            if name in self.given:
+            if name in self.model_fields_set:
                 raise wrong(f"`{name}` does not belong to model {self.model}", at=name, fix="remove it or change model")
         if not table:
             return
@@ -81,7 +83,7 @@ class CertifiedDistortion(Distortion):
 
     k0: Number = key("`brown`: the radial coefficient k0 of USGS, D = X k0: part of the principal distance", 0.0)
 
-    @Rule
+    @rule
     def _k0_scales_the_image(self) -> None:
         if self.k0 and self.model != "brown":
             raise wrong(f"`k0` does not belong to model {self.model}", at="k0", fix="remove it or change model")
@@ -120,7 +122,7 @@ class PixelCamera(Section):
         None,
     )
 
-    @Rule
+    @rule
     def _coefficients_have_counterparts(self) -> None:
         try:
             self.in_millimetres("")
@@ -143,7 +145,6 @@ class PixelCamera(Section):
 class Camera(Section):
     """One camera, in millimetres."""
 
-    kinds = "unit", {PIXELS: PixelCamera}
     unit: Annotated[str, choice((MILLIMETRES,))] | None = key("`mm`; `px` for a camera that is given in pixels", None)
     principal_distance: Positive = key("Principal distance", unit="mm")
     principal_point: Pair = key("Principal point in the system of the image coordinates", (0.0, 0.0), unit="mm")
@@ -164,7 +165,7 @@ class Camera(Section):
         None,
     )
 
-    @Rule
+    @rule
     def _marks_have_a_place(self) -> None:
         if self.fiducial_places and (self.fiducials or not self.fiducial_distances):
             message = "places of fiducial marks are for distances between them without coordinates"
@@ -173,6 +174,13 @@ class Camera(Section):
             message = "distances alone do not say which mark is where"
             fix = "give fiducial_places: {F1: bottom-right, ...}, or nominal coordinates in fiducials"
             raise wrong(message, at="fiducial_distances", fix=fix)
+
+
+def _unit(value: object) -> str:
+    return PIXELS if isinstance(value, dict) and value.get("unit") == PIXELS else MILLIMETRES
+
+
+AnyCamera = Annotated[Annotated[Camera, Tag(MILLIMETRES)] | Annotated[PixelCamera, Tag(PIXELS)], Discriminator(_unit)]
 
 
 class FirstPhoto(Angles):
@@ -187,8 +195,8 @@ class Strip(Section):
 
     id: Id = key("Id of the strip")
     camera: Id | None = key("Camera of all its photos, a key of `cameras`; not with model coordinates", None)
-    photos: Annotated[list[Id], Length(1)] = key("Photos in flight order: two at least, or one in a bundle adjustment")
-    models: Annotated[list[Id], Length(1)] | None = key(
+    photos: Annotated[list[Id], length(1)] = key("Photos in flight order: two at least, or one in a bundle adjustment")
+    models: Annotated[list[Id], length(1)] | None = key(
         "Independent models in flight order, one for every two neighbouring photos. Default: by their perspective"
         " centres",
         None,
@@ -202,6 +210,6 @@ class Photos(Section):
     """Photos of one camera in any order, among which a run finds the strips."""
 
     camera: Id = key("Camera of all these photos, a key of `cameras`")
-    photos: Annotated[list[Id], Length(1)] | None = key(
+    photos: Annotated[list[Id], length(1)] | None = key(
         "Their ids, in any order. Default: all measured photos that are listed nowhere else", None
     )

@@ -6,7 +6,7 @@ from photostrip.formats.measured.exterior import POSITIONS, ROTATIONS, orientati
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.schema.measurements import COLUMNS, Columns, ControlColumns, TableFile, header_names
-from photostrip.project.schema.sections import Rule, Section, key, wrong
+from photostrip.project.schema.sections import Section, key, rule, wrong
 from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, YAxis, choice
 
 PositionColumns = Annotated[Columns, header_names(POSITIONS)]
@@ -42,7 +42,7 @@ class GivenList(TableFile):
     epoch: Positive | None = EPOCH
     ellipsoid: Ellipsoid | None = ELLIPSOID
 
-    @Rule
+    @rule
     def _axes_are_given(self) -> None:
         if self.axes is None and self.crs != "geocentric":
             expected = "axes: [east, north, up], or [north, east, up] where x points north"
@@ -61,7 +61,7 @@ class Control(GivenList):
         None,
     )
 
-    @Rule
+    @rule
     def _zones_are_local(self) -> None:
         if self.other_zone and self.crs != "local":
             message = "zones of a known projection are tied by their formulas"
@@ -122,13 +122,13 @@ class GivenAngles(Section):
         None,
     )
 
-    @Rule
+    @rule
     def _conventions_are_said(self) -> None:
         needed = ("rotates", "y_axis") if self.system in ROTATIONS else ("looks",) if self.system == YAW else ()
         for name in ("looks", "rotates", "y_axis"):
             given = getattr(self, name)
             if name in needed and given is None:
-                expected = self.keys[name].description.partition(": ")[2]
+                expected = type(self).model_fields[name].description or "".partition(": ")[2]
                 message = f"`{name}` is missing, which nothing else says of {self.system}"
                 raise wrong(message, code="missing-key", at=name, expected=expected)
             if name not in needed and given is not None:
@@ -154,7 +154,7 @@ class Orientations(GivenList):
         unit="the angles' unit",
     )
 
-    @Rule
+    @rule
     def _true_north_is_somewhere(self) -> None:
         if self.angles.north == "true" and self.crs in {"local", "geocentric"}:
             message = f"nothing says where true north is in the frame `{self.crs}`"

@@ -13,7 +13,7 @@ from photostrip.formats.text.numbers import shown
 from photostrip.formats.text.table_reader import WORDS
 from photostrip.formats.text.table_text import MOST_LINES
 from photostrip.formats.text.tables import Column
-from photostrip.project.schema.sections import After, Before, Read, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Before, Read, Section, key, rule, wrong
 from photostrip.project.schema.values import Positive, Sigma3, Words, YAxis, choice, if_empty, text, whole
 
 
@@ -79,7 +79,7 @@ class TableFile(Section):
         "Lines above the table that are passed over", 0
     )
 
-    @Rule
+    @rule
     def _commas_mean_one_thing(self) -> None:
         if self.decimal == self.separator:
             message = "commas cannot stand between the fields and before decimals"

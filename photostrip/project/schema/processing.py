@@ -10,7 +10,7 @@ from photostrip.formats.text.numbers import shown
 from photostrip.network.settings import ASKED, SCREENINGS, TESTS
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
 from photostrip.project.schema.cameras import AUTO, SelfCalibration
-from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
 from photostrip.project.schema.values import (
     Flag,
     Fraction,
@@ -26,8 +26,8 @@ from photostrip.project.schema.values import (
     if_empty,
     quoted,
 )
-from photostrip.strip.independent_models.settings import METHODS as LINK_METHODS
-from photostrip.strip.polynomial.correction import DEGREES
+from photostrip.strip.independent_models.linking import METHODS as LINK_METHODS
+from photostrip.strip.polynomial import DEGREES
 from photostrip.strip.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
 from photostrip.strip.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
 
@@ -118,7 +118,7 @@ class Bundle(Section):
         unit="mm, mm^-2 for k1 and so on; 1 for affinity and shear",
     )
 
-    @Rule
+    @rule
     def _known_parameters(self) -> None:
         for name in self.calibration_sigma:
             if name not in ASKED:
@@ -206,7 +206,7 @@ class Processing(Section):
     )
     interior: Interior = key("Interior orientation", Interior())
 
-    @Rule
+    @rule
     def _azimuth_of_a_place(self) -> None:
         if self.earth_azimuth is not None and self.earth_latitude is None:
             message = "a direction has a radius of curvature at a latitude only"

@@ -5,12 +5,12 @@ from typing import Annotated
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.plausibility import KINDS
-from photostrip.project.schema.cameras import Camera, Photos, PixelCamera, Strip
+from photostrip.project.schema.cameras import AnyCamera, Photos, Strip
 from photostrip.project.schema.exports import ENDINGS, GEOPACKAGE, export, form_of
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
-from photostrip.project.schema.sections import Before, Length, OneOrMany, Read, Rule, Section, key, wrong
+from photostrip.project.schema.sections import Before, OneOrMany, Read, Section, key, length, rule, wrong
 from photostrip.project.schema.values import Positive, Words, if_empty, schema_number, single, text
 
 SCHEMA_NUMBER = 1
@@ -58,13 +58,13 @@ class ProjectFile(Section):
     photostrip: SchemaNumber = key("Number of this schema")
     name: Words | None = key("Name of the project; default: the file's name without its ending", None)
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
-    cameras: Annotated[dict[str, Camera | PixelCamera], Before(if_empty), Length(1)] = key(
+    cameras: Annotated[dict[str, AnyCamera], length(1), Before(if_empty)] = key(
         "Cameras by name; needed with `observations`", {}
     )
-    strips: Annotated[list[Strip], Length(1)] = key(
+    strips: Annotated[list[Strip], length(1)] = key(
         "Strips: photos in flight order; beside or in place of `photos`", []
     )
-    photos: Annotated[list[Photos], OneOrMany(), Length(1)] = key(
+    photos: Annotated[list[Photos], length(1), OneOrMany()] = key(
         "Photos in no given order, for the bundle adjustment: `{camera: name}`, or a list of `{camera, photos}`", []
     )
     observations: Observations | None = key("Points measured on photos; or `models`", None)
@@ -88,7 +88,7 @@ class ProjectFile(Section):
         [],
     )
 
-    @Rule
+    @rule
     def _models_have_no_oriented_photos(self) -> None:
         for name in self.export:
             if self.models is not None and form_of(name) != GEOPACKAGE:

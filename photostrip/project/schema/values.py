@@ -13,7 +13,7 @@ from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
-from photostrip.project.schema.sections import Read, wrong
+from photostrip.project.schema.sections import After, Read, wrong
 
 FALSE, TRUE = ("false", "no", "off"), ("true", "yes", "on")
 
@@ -200,3 +200,4 @@ Sigma3 = tuple[Positive, Positive, Positive]
 Axes = Annotated[tuple[str, str, str], Read(_axes, _AXES)]
 YAxis = Annotated[str, choice(("up", "down"))]
 Height = Annotated[str, choice(("ellipsoidal", "orthometric"))]
+FirstSchema = Annotated[Words, After(one_of("1"))]  # number of a schema that has not changed

@@ -1,24 +1,21 @@
-"""Phototheodolites by name: the list that comes with the program, and lists of the user."""
+"""Phototheodolites: by name in the list that comes with the program or in the user's own, or by their numbers."""
 
 from __future__ import annotations
 
 from importlib import resources
 from typing import Annotated
 
-from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import shown
-from photostrip.project.schema.sections import After, Length, Section, key
-from photostrip.project.schema.values import Id, Number, Words, bounded, one_of
+from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
+from photostrip.project.schema.values import FirstSchema, Id, Number, Words, bounded
 from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
 from photostrip.project.yaml.parsing import parse, read_document
-from photostrip.project.yaml.tree import Node
+from photostrip.project.yaml.reading import Reading
+from photostrip.project.yaml.tree import Node, Path
 from photostrip.project.yaml.validation import checked
-from photostrip.terrestrial.frame import Phototheodolite
+from photostrip.terrestrial.normal_case import Phototheodolite
 
 OWN_LIST = "phototheodolites.yaml"
-SCHEMA_NUMBER = "1"
-
 
 Distance = Annotated[Number, After(bounded(PRINCIPAL_DISTANCE))]
 Place = tuple[Annotated[Number, After(bounded(COORDINATE))], Annotated[Number, After(bounded(COORDINATE))]]
@@ -36,49 +33,92 @@ class Preset(Section):
 class PresetFile(Section):
     """A list of cameras."""
 
-    photostrip_cameras: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
-    cameras: Annotated[dict[Id, Preset], Length(1)] = key("Cameras by name")
+    photostrip_cameras: FirstSchema = key("Number of this schema: 1")
+    cameras: Annotated[dict[Id, Preset], length(1)] = key("Cameras by name")
+
+
+class Camera(Section):
+    """One camera: a preset, or its own numbers, or a preset and what is different from it."""
+
+    preset: Words | None = key("Name of a camera of the list that comes with the program, or of `presets`", None)
+    principal_distance: Distance | None = key("Principal distance; default: that of the preset", None, unit="mm")
+    principal_point: Place | None = key(
+        "Principal point x0, z0 in the system of the image coordinates; default: that of the preset, or 0, 0",
+        None,
+        unit="mm",
+    )
+    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
+
+    @rule
+    def _has_a_principal_distance(self) -> None:
+        if self.preset is None and self.principal_distance is None:
+            expected = "`preset`, or `principal_distance` in mm"
+            raise wrong("nothing says what the camera is", code="missing-key", expected=expected)
+
+
+def _named(value: object) -> object:
+    """Let a name stand for a camera of a list."""
+    return {"preset": value} if isinstance(value, str) and value else value
+
+
+CameraOrName = Annotated[Camera, Before(_named)]
 
 
 def own_presets() -> dict[str, Phototheodolite]:
     """Return the cameras that come with the program."""
     text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
     findings = Findings()
-    found = listed_cameras(parse(text, OWN_LIST, findings), findings)
+    found = _listed(parse(text, OWN_LIST, findings), findings)
     findings.stop()
     return found
 
 
-def read_presets(file: str | None) -> dict[str, Phototheodolite]:
+def known_presets(reading: Reading) -> dict[str, Phototheodolite]:
     """Return all cameras that can be named; those of the user's list come before those of the program."""
-    if file is None:
-        return own_presets()
-    findings = Findings()
-    found = listed_cameras(read_document(file, findings), findings)
-    findings.stop()
-    return own_presets() | found
+    known = own_presets()
+    for path, findings in reading.named(("presets",)):
+        known |= _listed(read_document(path, findings), reading.findings)
+    return known
 
 
-def listed_cameras(root: Node | None, findings: Findings) -> dict[str, Phototheodolite]:
+def _listed(root: Node | None, findings: Findings) -> dict[str, Phototheodolite]:
     """Return the cameras of a list; none when it is at fault."""
     given = checked(PresetFile, root, findings) if root is not None else None
-    if given is None:
-        return {}
-    return {
-        str(name): Phototheodolite(
-            name=str(name),
-            principal_distance=each.principal_distance,
-            principal_point=each.principal_point,
-            format=each.format,
-        )
-        for name, each in given.cameras.items()
-    }
+    return {} if given is None else {name: _camera(name, each) for name, each in given.cameras.items()}
 
 
-def preset(name: str, known: dict[str, Phototheodolite], where: str) -> Phototheodolite:
-    """Return a camera by name, or refuse a name that no camera has; `where` is the option or key of it."""
-    if name not in known:
-        fix = suggestion(name, known) or "give --principal-distance, or a list of your own with --presets"
-        message = f"there is no camera `{shown(name)}`"
-        raise InputError(Fault(message, "unknown-camera", key=where, expected=f"one of {', '.join(known)}", fix=fix))
-    return known[name]
+def _camera(name: str, given: Preset) -> Phototheodolite:
+    return Phototheodolite(
+        str(name),
+        principal_distance=given.principal_distance,
+        principal_point=given.principal_point,
+        format=given.format,
+    )
+
+
+def phototheodolite(
+    name: str, given: Camera, known: dict[str, Phototheodolite], reading: Reading, path: Path
+) -> Phototheodolite | None:
+    """Return a camera: its preset with what is different; None where there is no such preset."""
+    if given.preset is not None and given.preset not in known:
+        message = f"there is no preset `{given.preset}`"
+        expected, fix = f"one of {', '.join(known)}", suggestion(given.preset, known)
+        reading.refuse((*path, "preset"), message, "unknown-camera", expected=expected, fix=fix)
+        return None
+    base = known[given.preset] if given.preset is not None else Phototheodolite(name, given.principal_distance or 0.0)
+    return Phototheodolite(
+        name=name,
+        principal_distance=given.principal_distance or base.principal_distance,
+        principal_point=given.principal_point or base.principal_point,
+        format=given.format or base.format,
+    )
+
+
+def only_camera(given: Camera, reading: Reading, *, whole: bool = False) -> Phototheodolite:
+    """Return the camera under the key ``camera``, or raise every fault; `whole`: one that has a format."""
+    name = "camera" if given.preset is None else str(given.preset)
+    found = phototheodolite(name, given, known_presets(reading), reading, ("camera",))
+    if whole and found is not None and found.format is None:
+        message = f"the camera {name} has no format"
+        reading.refuse(("camera", "format"), message, "no-format", expected="[width, height] in mm")
+    return reading.complete(found)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Table
 from photostrip.project.schema.values import Range
@@ -30,13 +29,6 @@ ECCENTRICITY = Range(-10.0, 10.0, "m")
 REFRACTION = Range(-10.0, 10.0, "")
 TIME = Range(-1e9, 1e9, "")
 SIGNIFICANCE = Range(1e-6, 0.5, "")
-
-
-def within(option: str, value: float, limits: Range) -> float:
-    """Return the value of an option, or refuse one outside limits."""
-    if not limits.holds(value):
-        raise InputError(Fault(f"{value:g} is out of range", "range", key=option, expected=str(limits)))
-    return value
 
 
 def refuse_outside(

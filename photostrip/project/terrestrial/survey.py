@@ -1,35 +1,40 @@
-"""A terrestrial project, or a table of the normal case alone, read and checked: plain input for the mathematics."""
+"""A terrestrial project, read and checked: plain input for the mathematics."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.errors import InputError
-from photostrip.formats.output.terrestrial_directions import Theodolite
-from photostrip.formats.output.terrestrial_displacements import ReportFrame
-from photostrip.formats.text.findings import Findings, suggestion
+from photostrip.formats.text.findings import suggestion
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note
-from photostrip.project.terrestrial.cameras import listed_cameras, own_presets
-from photostrip.project.terrestrial.options import SightingOptions, read_sightings
+from photostrip.project.terrestrial.cameras import known_presets, phototheodolite
 from photostrip.project.terrestrial.ranges import MILLIMETRES, RADIANS
 from photostrip.project.terrestrial.series import Table, Wanted, read_series
-from photostrip.project.terrestrial.survey_file import Camera, Measurements, Station, TerrestrialFile
-from photostrip.project.yaml.parsing import read_document
+from photostrip.project.terrestrial.survey_file import Measurements, TerrestrialFile
+from photostrip.project.terrestrial.tables import SightingUnits, read_sightings
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.validation import valid_section
-from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
+from photostrip.terrestrial.accuracy import Theodolite
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
-from photostrip.terrestrial.normal_case import SIDES, StereoPair, normal_pair
+from photostrip.terrestrial.normal_case import SIDES, Phototheodolite, StereoPair, ground_from_photo, normal_pair
 from photostrip.terrestrial.orientation import OrientationSettings, orient
 
 USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none
 NORMAL_AXES = ("right", "ahead", "up")
+
+
+class ReportFrame(NamedTuple):
+    """Axes and times as the user wants them."""
+
+    axes: tuple[str, str, str]  # names of the ground axes in the user's order
+    order: tuple[int, int, int]  # which internal axis each of them is
+    time_unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +51,9 @@ class Survey:
     notes: tuple[Note, ...]
 
 
-def load_survey(path: Path, overrides: Sequence[str] = ()) -> Survey:
+def load_survey(path: Path | None, overrides: Sequence[str] = ()) -> Survey:
     """Read a terrestrial project and its table, or raise every fault of every file."""
-    reading = Reading.of(str(path), overrides)
+    reading = Reading.of_keys(TerrestrialFile, path, overrides)
     checked = reading.checked(TerrestrialFile)
     cameras = _cameras(checked, reading) if checked is not None else []
     series = _series(checked, reading, cameras)
@@ -67,42 +72,15 @@ def load_survey(path: Path, overrides: Sequence[str] = ()) -> Survey:
     )
 
 
-def load_normal_case(
-    file: str,
-    camera: Phototheodolite,
-    base: float,
-    table: Table,
-    stable: Sequence[str],
-    settings: MonitoringSettings,
-) -> Survey:
-    """Read a table of the normal case, without a project file, or raise its faults."""
-    findings = Findings()
-    centre = np.array([camera.principal_point] * 2)
-    series = read_series(file, table, centre, Wanted(stable=tuple(stable)), findings)
-    findings.stop()
-    if series is None:  # cannot be: stop() raised the reason
-        raise InputError(f"{file} cannot be read")
-    return Survey(
-        name="displacements",
-        series=series,
-        pair=normal_pair(camera.principal_distance, base),
-        settings=settings,
-        cameras=(camera, camera),
-        frame=ReportFrame(NORMAL_AXES, (0, 1, 2), "year"),
-        files=(file,),
-        notes=tuple(findings.notes),
-    )
-
-
 def _cameras(given: TerrestrialFile, reading: Reading) -> list[Phototheodolite]:
     """Return the cameras of both stations; fewer when one is at fault."""
-    known = own_presets()
-    for path, findings in reading.named(("presets",)):
-        tree = read_document(path, findings)
-        known |= listed_cameras(tree, reading.findings)
-    found = {str(name): _camera(str(name), each, known, reading) for name, each in given.cameras.items()}
+    known = known_presets(reading)
+    found = {
+        str(name): phototheodolite(str(name), each, known, reading, ("cameras", str(name)))
+        for name, each in given.cameras.items()
+    }
     result = []
-    for side, station in zip(SIDES, (given.stations.left, given.stations.right), strict=True):
+    for side, station in zip(SIDES, given.both, strict=True):
         if station.camera in found:
             result += [camera for camera in [found[station.camera]] if camera is not None]
             continue
@@ -112,42 +90,25 @@ def _cameras(given: TerrestrialFile, reading: Reading) -> list[Phototheodolite]:
     return result
 
 
-def _camera(name: str, given: Camera, known: dict[str, Phototheodolite], reading: Reading) -> Phototheodolite | None:
-    """Return a camera: its preset with what is different."""
-    if given.preset is not None and given.preset not in known:
-        message = f"there is no preset `{given.preset}`"
-        expected, fix = f"one of {', '.join(known)}", suggestion(given.preset, known)
-        reading.refuse(("cameras", name, "preset"), message, "unknown-camera", expected=expected, fix=fix)
-        return None
-    base = known[given.preset] if given.preset is not None else Phototheodolite(name, given.principal_distance or 0.0)
-    return Phototheodolite(
-        name=name,
-        principal_distance=given.principal_distance or base.principal_distance,
-        principal_point=given.principal_point or base.principal_point,
-        format=given.format or base.format,
-    )
-
-
 def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: Reading) -> StereoPair:
     focal = (cameras[0].principal_distance, cameras[1].principal_distance)
     if given.axes is None:
         normal = normal_pair(focal[0], given.base or 0.0)
         return StereoPair(focal, normal.centers, normal.rotations)
     order = [given.axes.index(axis) for axis in GROUND_AXES]
-    both = (given.stations.left, given.stations.right)
-    centers = np.array([each.position for each in both], float)[:, order]
+    centers = np.array([each.position for each in given.both], float)[:, order]
     rotations = np.array([_rotation(given, side, camera, reading) for side, camera in zip(SIDES, cameras, strict=True)])
-    ahead = np.array([each.eccentricity for each in both])
+    ahead = np.array([each.eccentricity for each in given.both])
     # the optical axis is the third axis of the photo turned round
     return StereoPair(focal, centers - ahead[:, None] * rotations[:, :, 2], rotations)
 
 
 def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, reading: Reading) -> Floats:
     """Photo to ground of a station, from its angles or from the directions measured there."""
-    station: Station = getattr(given.stations, side)
+    station = given.both[SIDES.index(side)]
     unit = MILLIMETRES[str(given.measurements.unit)]
     sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * unit
-    wanted = SightingOptions(
+    wanted = SightingUnits(
         unit=str(given.measurements.unit),
         angles=given.angle_unit,
         sigma=sigma,
@@ -155,8 +116,8 @@ def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, readin
     )
     sightings = None
     for path, findings in reading.named(("stations", side, "directions")):
-        sightings, notes = read_sightings(path, wanted)
-        findings.notes.extend(notes)
+        sightings = read_sightings(path, wanted, findings)
+    reading.findings.stop()
     if sightings is not None:
         settings = OrientationSettings(eccentricity=station.eccentricity)
         return orient(sightings, camera.principal_distance, camera.principal_point, settings).rotation

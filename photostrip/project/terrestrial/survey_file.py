@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, wrong
-from photostrip.project.schema.values import Axes, Id, Number, Positive, Words, YAxis, bounded, one_of
-from photostrip.project.terrestrial.cameras import Distance, Place, Size
+from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
+from photostrip.project.schema.values import Axes, FirstSchema, Id, Number, Positive, Words, YAxis, bounded, one_of
+from photostrip.project.terrestrial.cameras import CameraOrName
 from photostrip.project.terrestrial.ranges import (
     BASE,
     DEGREES,
@@ -21,7 +21,6 @@ from photostrip.project.terrestrial.ranges import (
 )
 from photostrip.terrestrial.monitoring import MOVED_CAMERA, MonitoringSettings
 
-SCHEMA_NUMBER = "1"
 USUAL = MonitoringSettings()
 Coordinate = Annotated[Number, After(bounded(POSITION))]
 Three = tuple[Coordinate, Coordinate, Coordinate]
@@ -37,25 +36,6 @@ def _ground_axes(value: tuple[str, str, str]) -> tuple[str, str, str]:
     if sorted(value) != sorted(GROUND_AXES):
         raise wrong("the axes of the stations are not on the ground", expected="a permutation of [east, north, up]")
     return value
-
-
-class Camera(Section):
-    """One camera: a preset, or its own numbers, or a preset and what is different from it."""
-
-    preset: Words | None = key("Name of a camera of the list that comes with the program, or of `presets`", None)
-    principal_distance: Distance | None = key("Principal distance; default: that of the preset", None, unit="mm")
-    principal_point: Place | None = key(
-        "Principal point x0, z0 in the system of the image coordinates; default: that of the preset, or 0, 0",
-        None,
-        unit="mm",
-    )
-    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
-
-    @Rule
-    def _has_a_principal_distance(self) -> None:
-        if self.preset is None and self.principal_distance is None:
-            expected = "`preset`, or `principal_distance` in mm"
-            raise wrong("nothing says what the camera is", code="missing-key", expected=expected)
 
 
 class Station(Section):
@@ -80,7 +60,7 @@ class Station(Section):
         "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
     )
 
-    @Rule
+    @rule
     def _is_complete(self) -> None:
         turned = [name for name in ("alpha", "omega", "kappa") if getattr(self, name) is not None]
         if self.directions is not None and turned:
@@ -128,7 +108,7 @@ class Measurements(Section):
         "Standard deviation of a pseudo-parallax in rows without one; default: `sigma`", None, unit="unit"
     )
 
-    @Rule
+    @rule
     def _one_table(self) -> None:
         if (self.coordinates is None) == (self.pseudo_parallaxes is None):
             what = "two tables are named" if self.coordinates is not None else "no table is named"
@@ -157,12 +137,12 @@ class Processing(Section):
 class TerrestrialFile(Section):
     """Displacements from photos of two stations."""
 
-    photostrip_terrestrial: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the survey", "displacements")
     presets: Words | None = key("A list of cameras of your own", None)
-    cameras: Annotated[dict[Id, Camera], Length(1)] = key("Cameras by name")
-    stations: Stations = key("The two stations")
+    cameras: Annotated[dict[Id, CameraOrName], length(1)] = key("Cameras by name")
+    stations: Stations | None = key("The two stations; default: the normal case, with the only camera at both", None)
     axes: Annotated[Axes, After(_ground_axes)] | None = key(
         "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
     )
@@ -178,9 +158,19 @@ class TerrestrialFile(Section):
     stable: list[Id] = key("Points that are taken not to move", [])
     processing: Processing = key("How displacements are tested", Processing())
 
-    @Rule
+    @property
+    def both(self) -> tuple[Station, Station]:
+        """The left and the right station."""
+        if self.stations is None:
+            station = Station(camera=next(iter(self.cameras)))
+            return station, station
+        return self.stations.left, self.stations.right
+
+    @rule
     def _one_geometry(self) -> None:
-        left, right = self.stations.left, self.stations.right
+        if self.stations is None and len(self.cameras) > 1:
+            raise wrong("nothing says which camera stands where", code="missing-key", expected="`stations`")
+        left, right = self.both
         if left.free != right.free:
             side = "right" if left.free else "left"
             raise wrong(

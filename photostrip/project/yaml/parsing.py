@@ -1,4 +1,4 @@
-"""YAML text to a tree of texts with their places, over the events of PyYAML.
+"""YAML text to a tree of texts with their places, as PyYAML composes it.
 
 What makes YAML files hard to trust is refused: keys that stand twice, merge keys, tags, several documents in one file.
 Aliases stand for what their anchors name, as programs write shared lists; what they make of a file counts towards its
@@ -23,6 +23,8 @@ LARGEST_PROJECT = 10 * MEGABYTE
 MOST_VALUES = 100_000  # a strip of a thousand photos has two thousand
 DEEPEST = 20
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the C parser is ten times faster where it is there
+TAGS = {f"tag:yaml.org,2002:{each}" for each in ("str", "seq", "map")}  # of what has none
+_ALIAS = re.compile(r"\*([^\s,\[\]{}]+)")
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ufffe\uffff]")
 
 
@@ -58,159 +60,103 @@ def parse(text: str, file: str, findings: Findings) -> Node | None:
         message = f"the character U+{ord(bad[0]):04X} is not allowed in YAML"
         findings.add(Fault(message=message, code="yaml", file=file, line=line, column=column, fix="remove it"))
         return None
-    builder = _Builder(file, findings)
     try:
         text.encode()
-        for event in yaml.parse(text, Loader=LOADER):
-            builder.take(event)
+        composed = yaml.compose(text, Loader=LOADER)
+        return Node("", Place(file, 1, 1)) if composed is None else _Tree(file, findings).whole(composed)
     except yaml.YAMLError as error:
         findings.add(_syntax(error, text, file))
-        return None
     except UnicodeEncodeError:
         findings.add(Fault("is not valid Unicode text", "encoding", file))
-        return None
+    except RecursionError:
+        findings.add(
+            Place(file, 1, 1).fault(f"values are nested more than {DEEPEST} deep", "yaml", expected="a project")
+        )
     except InputError as error:  # no document that a person would write
         findings.add(*error.faults)
-        return None
-    return builder.root if builder.sound else None
+    return None
 
 
-class _Builder:
-    """Builds the tree from the events of the YAML parser, without recursion."""
+class _Tree:
+    """Makes a tree of texts of what PyYAML composed; what an alias stands for is copied, and counts each time."""
 
     def __init__(self, file: str, findings: Findings) -> None:
         self.file, self.findings = file, findings
-        self.root = Node("", Place(file, 1, 1))
         self.sound = True
-        self.open: list[Node] = []
-        self.key: list[tuple[str, Place] | None] = []  # for each open node the key that waits for its value
-        self.named: dict[str, Node] = {}  # by anchor
-        self.documents = self.values = 0
+        self.values = 0
 
-    def take(self, event: yaml.Event) -> None:
-        mark = event.start_mark
-        place = Place(self.file, mark.line + 1, mark.column + 1) if mark is not None else Place(self.file)
-        if isinstance(event, yaml.DocumentStartEvent):
-            self._document(place)
-        elif isinstance(event, yaml.AliasEvent):
-            self._put(self._meant(event.anchor or "", place))
-        elif isinstance(event, yaml.ScalarEvent):
-            node = Node(self._text(event, place), place)
-            self._properties(event, node)
-            self._put(node)
-        elif isinstance(event, yaml.SequenceStartEvent | yaml.MappingStartEvent):
-            node = Node([] if isinstance(event, yaml.SequenceStartEvent) else {}, place)
-            self._properties(event, node)
-            self._open(node)
-        elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
-            self.open.pop()
-            self.key.pop()
+    def whole(self, composed: yaml.Node) -> Node | None:
+        """Return the tree, None when it cannot be trusted; raises InputError for what no person would write."""
+        root = self._node(composed, ())
+        return root if self.sound else None
 
-    def _refuse(self, place: Place, message: str, code: str, fix: str = "", expected: str = "") -> None:
-        self.findings.add(place.fault(message, code, expected=expected, fix=fix))
-
-    def _document(self, place: Place) -> None:
-        self.documents += 1
-        if self.documents > 1:
-            message = "a second document (`---`) begins"
-            raise InputError(place.fault(message, "yaml", expected="one project in one file"))
-
-    def _properties(self, event: Any, node: Node) -> None:  # noqa: ANN401 (three kinds of event, without a type)
-        """Remember what an anchor names; refuse tags: a value is what is typed."""
-        if event.anchor is not None:
-            self.named[event.anchor] = node
-        if event.tag is not None:
-            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
-            self._refuse(node.place, f"the tag {shown(tag)} cannot be used", "tag", "remove it")
-
-    def _meant(self, anchor: str, place: Place) -> Node:
-        """Return a copy of what an alias stands for."""
-        node = self.named.get(anchor)
-        if node is not None and not any(each is node for each in self.open):
-            return self._copied(node, place, len(self.open))
-        what = f"the alias *{shown(anchor)} stands for " + ("nothing" if node is None else "something it is part of")
-        fix = f"name a value with &{shown(anchor)} before, or put * between quotation marks" if node is None else ""
-        self._refuse(place, what, "alias", fix or "write the value itself")
-        self.sound = False
-        return Node("", place)
-
-    def _copied(self, node: Node, place: Place, depth: int) -> Node:
-        """Copy a value to another place, what is in it keeps its own."""
-        self._count(node, depth)
-        if isinstance(node.value, str):
-            return Node(node.value, place)
-        if isinstance(node.value, list):
-            return Node([self._copied(each, each.place, depth + 1) for each in node.value], place)
-        entries = {key: self._copied(each, each.place, depth + 1) for key, each in node.value.items()}
-        return Node(entries, place, dict(node.keys))
-
-    def _count(self, node: Node, depth: int) -> None:
-        """Refuse what no person would write."""
+    def _node(self, given: yaml.Node, above: tuple[yaml.Node, ...]) -> Node:
+        place = Place(self.file, given.start_mark.line + 1, given.start_mark.column + 1)
         self.values += 1
         if self.values > MOST_VALUES:
             message = f"the file has more than {MOST_VALUES} values"
             raise InputError(Fault(message, "file-size", self.file, expected="a project"))
-        if depth >= DEEPEST and not isinstance(node.value, str):
+        if given in above:
+            message = "an alias below this value stands for the value itself"
+            raise InputError(place.fault(message, "alias", fix="write what is meant"))
+        if given.tag not in TAGS:
+            tag = given.tag.replace("tag:yaml.org,2002:", "!!")
+            self.findings.add(place.fault(f"the tag {shown(tag)} cannot be used", "tag", fix="remove it"))
+        if isinstance(given, yaml.ScalarNode):
+            return Node(self._text(given, place), place)
+        if len(above) >= DEEPEST:
             message = f"values are nested more than {DEEPEST} deep"
-            raise InputError(node.place.fault(message, "yaml", expected="a project"))
+            raise InputError(place.fault(message, "yaml", expected="a project"))
+        if isinstance(given, yaml.SequenceNode):
+            return Node([self._node(each, (*above, given)) for each in given.value], place)
+        node = Node({}, place)
+        for key, value in given.value:
+            self._enter(node, self._node(key, (*above, given)), self._node(value, (*above, given)))
+        return node
 
-    def _text(self, event: yaml.ScalarEvent, place: Place) -> str:
-        text: str = event.value
+    def _text(self, given: yaml.ScalarNode, place: Place) -> str:
+        text: str = given.value
         stripped = text.strip()
-        if stripped != text and event.style in {"'", '"'}:
+        if stripped != text and given.style in {"'", '"'}:
             message = f"blanks around `{shown(text)}` removed"
             self.findings.notes.append(place.note("stray-blanks", message))
         return stripped
 
-    def _open(self, node: Node) -> None:
-        self._put(node)
-        self.open.append(node)
-        self.key.append(None)
-
-    def _put(self, node: Node) -> None:
-        """Return a new value its place in the tree."""
-        self._count(node, len(self.open))
-        if not self.open:
-            self.root = node
-            return
-        parent, waiting = self.open[-1], self.key[-1]
-        if isinstance(parent.value, list):
-            parent.value.append(node)
-        elif waiting is None:
-            self.key[-1] = self._key(node)
-        else:
-            self.key[-1] = None
-            self._enter(parent, *waiting, node)
-
-    def _key(self, node: Node) -> tuple[str, Place]:
-        place = node.place
-        if not isinstance(node.value, str):
-            self._refuse(place, f"{type_names[type(node.value)]} is used as a key", "key", expected="a single word")
-            self.sound = False
-        elif not node.value:
-            self._refuse(place, "a key is empty", "key", expected="a name before the colon")
-            self.sound = False
-        elif node.value == "<<":
-            self._refuse(place, "merge keys cannot be used", "merge-key", "write the keys, or use `extends`")
-            self.sound = False
-        return node.text, place
-
-    def _enter(self, parent: Node, key: str, place: Place, node: Node) -> None:
+    def _enter(self, parent: Node, key: Node, value: Node) -> None:
         """Put a value under its key; the first of two equal keys counts."""
-        first = parent.keys.get(key)
-        if first is not None:
+        name, place, first = key.text, key.place, parent.keys.get(key.text)
+        if not isinstance(key.value, str):
+            fault = place.fault(f"{type_names[type(key.value)]} is used as a key", "key", expected="a single word")
+        elif not name:
+            fault = place.fault("a key is empty", "key", expected="a name before the colon")
+        elif name == "<<":
+            fault = place.fault("merge keys cannot be used", "merge-key", fix="write the keys, or use `extends`")
+        elif first is not None:
             where = f"line {first.line}" if first.line != place.line else f"column {first.column}"
-            message = f"the key `{shown(key)}` appears a second time; it is first given in {where}"
-            self.findings.add(place.fault(message, "duplicate-key", key=shown(key), fix="keep one of them"))
+            message = f"the key `{shown(name)}` appears a second time; it is first given in {where}"
+            fault = place.fault(message, "duplicate-key", key=shown(name), fix="keep one of them")
+        else:
+            parent.entries[name], parent.keys[name] = value, place
             return
-        parent.entries[key] = node
-        parent.keys[key] = place
+        self.findings.add(fault)
+        self.sound &= first is not None
 
 
 def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
     """Say where YAML breaks off and what may be the matter."""
     problem = str(getattr(error, "problem", None) or error).splitlines()[0]
     mark = getattr(error, "problem_mark", None)
+    if (
+        "undefined alias" in problem
+        and mark is not None
+        and (alias := _ALIAS.match(text.splitlines()[mark.line], mark.column))
+    ):
+        message, fix = (
+            f"the alias *{shown(alias[1])} stands for nothing",
+            f"name a value with &{shown(alias[1])} before",
+        )
+        fix += ", or put * between quotation marks"
+        return Fault(message, "alias", file, line=mark.line + 1, column=mark.column + 1, fix=fix)
     begun = getattr(error, "context_mark", None)
     lines = text.splitlines() or [""]
     if mark is None:
@@ -225,6 +171,9 @@ def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
 
 
 _PROBLEMS = (
+    ("another document", "a second document (`---`) begins", "write one project in one file"),
+    ("second occurrence", "two values are named with the same &", "give one of them another name"),
+    ("maximum nesting depth", f"values are nested more than {DEEPEST} deep", "write a project"),
     ("mapping values are not allowed", "a second colon, or a key where none can stand",
      "put the value between quotation marks, or correct the indentation"),
     ("did not find expected ',' or", "a bracket is not closed", "close it"),

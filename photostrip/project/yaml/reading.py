@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
 from typing import TypeVar
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.project.schema.sections import Section
 from photostrip.project.yaml.merging import override, path_of, read_tree, where_named
-from photostrip.project.yaml.tree import Node, Path, at_own_key, fault_at
+from photostrip.project.yaml.tree import COMMAND_LINE, Node, Path, Place, at_own_key, fault_at
 from photostrip.project.yaml.validation import checked
 
 S = TypeVar("S", bound=Section)
@@ -35,6 +36,15 @@ class Reading:
         if root is None:
             raise InputError(findings.faults)
         return cls(file=file, root=root, findings=findings, files=files).with_set(assignments)
+
+    @classmethod
+    def of_keys(cls, kind: type[Section], path: FilePath | None, assignments: Sequence[str]) -> Reading:
+        """Read a file of which every key can be set, or make one of assignments alone."""
+        if path is not None:
+            return cls.of(str(path), assignments)
+        place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name.startswith("photostrip"))
+        root = Node({number: Node("1", place)}, place, {number: place})
+        return cls(file=COMMAND_LINE, root=root, findings=Findings(), files=[]).with_set(assignments)
 
     def with_set(self, assignments: Sequence[str]) -> Reading:
         return replace(self, root=override(self.root, assignments, self.findings))
@@ -94,6 +104,12 @@ class Reading:
         except InputError as error:
             named = (replace(fault, key=(keys or {}).get(fault.key, fault.key)) for fault in error.faults)
             raise InputError(at_own_key(fault, self.root) for fault in named) from None
+
+
+def read_keys(kind: type[S], path: FilePath | None, assignments: Sequence[str]) -> tuple[S, Reading]:
+    """Read a file of which every key can be set, or make one of assignments alone, or raise every fault."""
+    reading = Reading.of_keys(kind, path, assignments)
+    return reading.read(kind), reading
 
 
 def read_file(kind: type[S], file: str, assignments: Sequence[str] = ()) -> tuple[S, Reading]:

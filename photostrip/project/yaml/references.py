@@ -88,7 +88,7 @@ OF_PHOTOS = ("photos", "observations", "fiducial_measurements", "camera_position
 
 def _lacks(root: Node, name: str) -> bool:
     """Whether a file has no such key, not even misspelled, which the schema tells."""
-    misspelled = (each for each in root.entries if each not in ProjectFile.keys)
+    misspelled = (each for each in root.entries if each not in ProjectFile.model_fields)
     return not root.has(name) and not any(suggestion(each, [name]) for each in misspelled)
 
 

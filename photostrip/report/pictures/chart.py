@@ -1,134 +1,423 @@
-"""Panels with axes that lie side by side: small multiples of strips, axes of space or photos."""
+"""Charts: panels with axes, or maps to scale, side by side; layers in them hold what is drawn, in their coordinates.
+
+Rows of coordinates are x, y; those with NaN are not drawn. A layer with ``words`` stands in the legend once.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from photostrip.report.pictures import svg
 
+Floats = NDArray[np.float64]
+Range = tuple[float, float]
+
 WIDTH = 960.0  # of a picture
-LEFT, RIGHT, TOP, BOTTOM = 70.0, 24.0, 64.0, 54.0  # margins of a chart
-GAP = 66.0  # between panels, for the numbers of an axis
-MOST_STRIPS = 16  # that have a panel each
-EMPTY = 1e-12  # a range without extent
+LEFT, RIGHT, BELOW, GAP = 70.0, 24.0, 54.0, 66.0  # beside and between panels with axes
+MARGIN, BETWEEN = 24.0, 14.0  # beside and between maps
+HIGHEST = 460.0  # map
+ROOM = 0.05  # around what a map shows, in shares of its extent
+TICKS = 6  # about so many on an axis
+LETTER, LETTER_HEIGHT = 7.2, 12.0  # at most so large
+MOST_HINTS = 1500  # more marks have none
+MOST_DOTS = 10_000  # more are thinned, and the caption says so
+MOST_TRIED = 400  # names for which room is looked for
+CELL = 4.0  # of the picture, that a name or mark takes
+FLAT = 1e-12  # a range without extent
+CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 
 
-class Entry(NamedTuple):
-    """A line of a legend."""
-
-    words: str
-    kind: str
-    shape: str = ""  # of a mark; none: a piece of the line
-
-
-def legend(entries: Iterable[Entry], y: float = 20.0) -> list[str]:
-    """Draw marks and lines with their meaning in a row."""
-    found, x = [], LEFT
-    for each in entries:
-        if each.shape:
-            found.append(svg.mark((x + 8.0, y), each.shape, each.kind, "", 5.0))
-        else:
-            found.append(svg.line((x - 8.0, y), (x + 16.0, y), each.kind))
-        found.append(svg.text((x + 22.0, y + 4.5), each.words))
-        x += 44.0 + 7.2 * len(each.words)
-    return found
+def nice(size: float) -> float:
+    """Return the next round number, 1, 2 or 5 times a power of ten, that is not smaller."""
+    if size <= 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(size))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= size * (1 - 1e-9))
 
 
-def span(values: Iterable[float], *, zero: bool = True, room: float = 0.06) -> tuple[float, float]:
+def span(values: ArrayLike, *, zero: bool = True, room: float = 0.06) -> Range:
     """Return a range that holds all values, and zero, with a little room."""
-    known = [*values, *([0.0] if zero else [])] or [0.0]
-    low, high = min(known), max(known)
-    if high - low < EMPTY:
+    known = np.asarray(values, np.float64).ravel()
+    known = np.append(known[np.isfinite(known)], [0.0] if zero else [])
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    if high - low < FLAT:
         return (low, low + 1.0) if zero else (low - 0.5, low + 0.5)
     spare = room * (high - low)
     return (0.0 if zero and low >= 0 else low - spare), (0.0 if zero and high <= 0 else high + spare)
 
 
-class Panel(NamedTuple):
-    x: svg.Axis
-    y: svg.Axis
+class Axis(NamedTuple):
+    """A scale from numbers to places on the picture; numbers beyond it stand at its ends."""
 
-    def at(self, x: float, y: float) -> svg.Point:
-        return self.x(x), self.y(y)
+    low: float
+    high: float
+    start: float
+    end: float
+    log: bool = False
+    names: Sequence[str] = ()  # at 1, 2, ... in place of numbers
 
-    def clipped(self, y: float) -> float:
-        """Return the place of a value; of one beyond the axis its end."""
-        return self.y(min(max(y, self.y.low), self.y.high))
+    def __call__(self, values: ArrayLike) -> Floats:
+        at, ends = np.clip(values, self.low, self.high), np.array([self.low, self.high])
+        if self.log:
+            at, ends = np.log10(at), np.log10(ends)
+        share: Floats = (at - ends[0]) / (ends[1] - ends[0])
+        return self.start + share * (self.end - self.start)
+
+    def ticks(self) -> list[tuple[float, str]]:
+        """Give round numbers along the axis; of names as many as there is room for."""
+        if self.names:
+            room = abs(self.end - self.start) / (LETTER * max(map(len, self.names)) + 8.0)
+            every = max(1, math.ceil(len(self.names) / room))
+            return [(float(n), name) for n, name in enumerate(self.names, 1)][::every]
+        if self.log:
+            decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+            rounded = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
+            return [(value, f"{value:g}") for value in rounded if self.low <= value <= self.high]
+        step = nice((self.high - self.low) / TICKS)
+        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
+        return [(n * step, f"{n * step:.6g}") for n in range(first, last + 1)]
 
 
-class Layout(NamedTuple):
-    """Panels of one size in rows and columns."""
+class Frame(NamedTuple):
+    """A panel on the picture."""
 
-    columns: int
-    height: float  # of a panel
-    number: int
+    x: Axis
+    y: Axis
+
+    def places(self, at: Floats) -> Floats:
+        at = np.asarray(at, np.float64).reshape(-1, 2)
+        return np.column_stack([self.x(at[:, 0]), self.y(at[:, 1])])
+
+
+# ------------------------------------------------------------------------------------------------------------- layers
+
+
+@dataclass(frozen=True)
+class Marks:
+    at: Floats
+    kind: str = "c1"  # classes of the style sheet: colour, and form where it is not filled
+    shape: str = "dot"
+    hints: Sequence[str] = ()
+    words: str = ""
+    size: float = 5.0
+    number: int = 0  # of marks of this kind in all layers, where there are several
+
+    def draw(self, frame: Frame) -> Iterator[str]:
+        known = np.flatnonzero(np.isfinite(self.at).all(axis=1))
+        places = frame.places(self.at[known])
+        if max(len(known), self.number) > MOST_HINTS:
+            yield svg.dots(places[:: self.every].tolist(), self.size, self.kind)
+            return
+        for place, row in zip(places.tolist(), known.tolist(), strict=True):
+            yield svg.mark(place, self.shape, f"mark {self.kind}", self.hints[row] if self.hints else "", self.size)
 
     @property
-    def whole(self) -> float:
-        """Return the height of the picture."""
-        rows = math.ceil(self.number / self.columns)
-        return TOP + rows * self.height + (rows - 1) * (BOTTOM + 24.0) + BOTTOM
+    def every(self) -> int:
+        """Tell which of very many marks are drawn."""
+        return math.ceil(max(len(self.at), self.number) / MOST_DOTS)
 
-    def panel(self, place: int, x: tuple[float, float], y: tuple[float, float]) -> Panel:
-        row, column = divmod(place, self.columns)
-        width = (WIDTH - LEFT - RIGHT - (self.columns - 1) * GAP) / self.columns
-        left = LEFT + column * (width + GAP)
-        top = TOP + row * (self.height + BOTTOM + 24.0)
-        return Panel(
-            svg.Axis(low=x[0], high=x[1], start=left, end=left + width),
-            svg.Axis(low=y[0], high=y[1], start=top + self.height, end=top),
-        )
+    def entry(self, x: float, y: float) -> str:
+        return svg.mark((x + 8.0, y), self.shape, f"mark {self.kind}", "", 5.0)
 
 
-class Multiples(NamedTuple):
-    """A panel for each strip: for all of them, or for the worst, in their order."""
+@dataclass(frozen=True)
+class Line:
+    at: Floats
+    kind: str = "c1"
+    words: str = ""
 
-    strips: list[str]
-    layout: Layout
-    some: str  # what the caption says of those that are not drawn
+    def draw(self, frame: Frame) -> Iterator[str]:
+        known = self.at[np.isfinite(self.at).all(axis=1)]
+        if len(known):
+            yield svg.path(frame.places(known).tolist(), f"line {self.kind}")
 
-    def titled(self, strip: str) -> str:
-        return f"strip {strip}" if self.some or len(self.strips) > 1 else ""
-
-
-def multiples(sizes: Mapping[str, float], what: str) -> Multiples:
-    """Choose the strips that are drawn; what: those with the largest sizes, in words."""
-    chosen = sorted(sizes, key=lambda strip: -sizes[strip])[:MOST_STRIPS]
-    number = len(chosen)
-    return Multiples(
-        strips=[strip for strip in sizes if strip in chosen],
-        layout=Layout(columns=1 if number == 1 else 2, height=210.0 if number == 1 else 140.0, number=number),
-        some="" if number == len(sizes) else f" {number} of {len(sizes)} strips, those with the {what}.",
-    )
+    def entry(self, x: float, y: float) -> str:
+        return svg.line((x - 8.0, y), (x + 16.0, y), f"line {self.kind}")
 
 
-def framed(panel: Panel, labels: tuple[str, str], title: str = "") -> list[str]:
-    """Draw grid, numbers and names of a panel's axes, and what it shows."""
-    found = svg.frame(panel.x, panel.y, labels)
-    if title:
-        found.append(svg.text((panel.x.start + 4.0, panel.y.end - 12.0), title, "title"))
-    return found
+@dataclass(frozen=True)
+class Segments:
+    """Lines from one place to another, each by itself: vectors, stems, limits."""
+
+    start: Floats
+    end: Floats
+    kind: str = "c1"
+    hints: Sequence[str] = ()
+    words: str = ""
+    bow: float = 0.0  # of each, in shares of its length
+
+    @property
+    def at(self) -> Floats:
+        return np.concatenate([np.asarray(self.start).reshape(-1, 2), np.asarray(self.end).reshape(-1, 2)])
+
+    def draw(self, frame: Frame) -> Iterator[str]:
+        start, end = np.split(frame.places(self.at), 2)
+        way = end - start
+        over = (start + end) / 2 + self.bow * way[:, ::-1] * (1.0, -1.0)
+        rows = np.concatenate([start, over, end] if self.bow else [start, end], axis=1)
+        steps = "M{} {}Q{} {} {} {}" if self.bow else "M{} {}L{} {}"
+        known = np.flatnonzero(np.isfinite(way).all(axis=1)).tolist()
+        pieces = [steps.format(*map(svg.number, row)) for row in rows[known].tolist()]
+        if len(known) > MOST_HINTS:
+            yield svg.element("path", d="".join(pieces), kind=f"line {self.kind}")
+            return
+        for row, piece in zip(known, pieces, strict=True):
+            hint = svg.titled(self.hints[row]) if self.hints else ""
+            yield svg.element("path", hint, d=piece, kind=f"line {self.kind}")
+
+    def entry(self, x: float, y: float) -> str:
+        return svg.line((x - 8.0, y), (x + 16.0, y), f"line {self.kind}")
 
 
-def framed_by_photos(panel: Panel, photos: Sequence[str], labels: tuple[str, str], title: str = "") -> list[str]:
-    """Draw axes of which the lower one has the ids of photos, from 1, as many as there is room for."""
-    room = (panel.x.end - panel.x.start) / (7.5 * max(map(len, photos)) + 8.0)
-    every = max(1, math.ceil(len(photos) / room))
-    found = [
-        svg.text((panel.x(n), panel.y.start + 18.0), photo, "tick", "middle")
-        for n, photo in enumerate(photos, 1)
-        if (n - 1) % every == 0
+@dataclass(frozen=True)
+class Areas:
+    outlines: Sequence[Floats]
+    kind: str = "area c1"
+    hints: Sequence[str] = ()
+    words: str = ""
+
+    @property
+    def at(self) -> Floats:
+        return np.concatenate([np.zeros((0, 2)), *self.outlines])
+
+    def draw(self, frame: Frame) -> Iterator[str]:
+        corners = [frame.places(outline).tolist() for outline in self.outlines]
+        if not self.hints:
+            yield svg.element("path", d="".join(f"M{svg.joined(each)}z" for each in corners), kind=self.kind)
+            return
+        for hint, each in zip(self.hints, corners, strict=True):
+            yield svg.polygon(each, self.kind, hint)
+
+    def entry(self, x: float, y: float) -> str:
+        return svg.mark((x + 8.0, y), "square", self.kind, "", 6.0)
+
+
+def box(x: Range, y: Range) -> Floats:
+    return np.array([(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])])
+
+
+def ellipse(a: float, b: float, angle: float) -> Floats:
+    """Return the outline of an ellipse around the origin; the angle is that of a, counter-clockwise from x."""
+    x, y, cosine, sine = a * np.cos(CIRCLE), b * np.sin(CIRCLE), np.cos(angle), np.sin(angle)
+    return np.column_stack([x * cosine - y * sine, x * sine + y * cosine])
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names beside their places where they cover no other name and no mark, the first ones first."""
+
+    at: Floats
+    names: Sequence[str]
+    beside: bool = True
+    words: str = field(default="", init=False)
+
+    def draw(self, frame: Frame) -> Iterator[str]:
+        places = frame.places(self.at)
+        top, bottom = sorted((frame.y.start, frame.y.end))
+        taken = np.zeros((int(bottom / CELL) + 8, int(WIDTH / CELL) + 1), bool)
+        if self.beside:
+            column, row = (places / CELL).astype(int).T
+            taken[row, column] = True
+        for name, (x, y) in list(zip(self.names, places.tolist(), strict=True))[:MOST_TRIED]:
+            wide = 0.9 * LETTER * len(name)
+            around = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
+            for left, base in around if self.beside else ((x - wide / 2, y + 4.0),):
+                if left < CELL or left + wide > WIDTH - CELL or not top - 4.0 < base < bottom + 16.0:
+                    continue
+                rows = slice(int((base - LETTER_HEIGHT + 2.0) / CELL), int(base / CELL) + 1)
+                box = taken[rows, int((left - 2.0) / CELL) : int((left + wide + 2.0) / CELL) + 1]
+                if not box.any():
+                    box[:] = True
+                    yield svg.text((left, base), name, "id")
+                    break
+
+    def entry(self, _x: float, _y: float) -> str:
+        return ""
+
+
+Layer = Marks | Line | Segments | Areas | Names
+
+# ------------------------------------------------------------------------------------------------------------- panels
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Layers between two axes; a range that is not given holds all layers, that of y with zero."""
+
+    layers: Sequence[Layer]
+    title: str = ""
+    labels: tuple[str, str] = ("", "")
+    x: Range | None = None
+    y: Range | None = None
+    names: Sequence[str] = ()  # at 1, 2, ... of the lower axis
+    rows: Sequence[str] = ()  # at 1, 2, ... of the upright axis
+    log: bool = False  # upright axis
+
+    def framed(self, corner: svg.Point, width: float, height: float) -> Frame:
+        at = np.concatenate([np.zeros((0, 2)), *(layer.at for layer in self.layers)])
+        x = self.x or (0.0, len(self.names) + 1.0) if self.names else self.x or span(at[:, 0], zero=False, room=0.02)
+        if self.log:
+            positive = at[:, 1][at[:, 1] > 0]
+            y = self.y or (float(positive.min(initial=np.inf)) * 0.8, float(positive.max(initial=0.0)) * 1.25)
+            y = y if y[0] < y[1] else (0.1, 1.0)
+        else:
+            y = self.y or ((len(self.rows) + 0.6, 0.4) if self.rows else span(at[:, 1]))
+        left, top = corner
+        low, high = min(y), max(y)
+        up = (top + height, top) if y[0] < y[1] else (top, top + height)
+        return Frame(Axis(*x, left, left + width, names=self.names), Axis(low, high, *up, self.log, self.rows))
+
+    def surround(self, frame: Frame) -> Iterator[str]:
+        """Draw grid lines, numbers and names of the axes."""
+        (x, y), bottom = frame, max(frame.y.start, frame.y.end)
+        top = min(frame.y.start, frame.y.end)
+        for value, words in x.ticks():
+            at = float(x(value))
+            if not self.names:
+                yield svg.line((at, bottom), (at, top), "grid")
+            yield svg.text((at, bottom + 18.0), words, "tick", "middle")
+        for value, words in y.ticks():
+            at = float(y(value))
+            yield svg.line((x.start, at), (x.end, at), "zero" if abs(value) < FLAT * abs(y.high - y.low) else "grid")
+            yield svg.text((x.start - 8.0, at + 4.0), words, "tick", "end")
+        yield svg.text(((x.start + x.end) / 2, bottom + 38.0), self.labels[0], "axis", "middle")
+        yield svg.text((x.start - 8.0, top - 12.0), self.labels[1], "axis", "end")
+        yield svg.text((x.start + 4.0, top - 12.0), self.title, "title")
+
+
+@dataclass(frozen=True)
+class Map:
+    """Layers to scale: what goes to the right is as long as what goes up."""
+
+    layers: Sequence[Layer]
+    title: str = ""
+    extent: tuple[Range, Range] | None = None  # along x and y, in place of all that the layers hold
+
+    def ranges(self) -> tuple[Range, Range]:
+        if self.extent:
+            return self.extent
+        at = np.concatenate([np.zeros((0, 2)), *(layer.at for layer in self.layers)])
+        at = at[np.isfinite(at).all(axis=1)]
+        low, high = (at.min(axis=0), at.max(axis=0)) if len(at) else (np.zeros(2), np.ones(2))
+        room = max(ROOM * float((high - low).max()), 1e-6)
+        (a, b), (c, d) = (low - room).tolist(), (high + room).tolist()
+        return (a, c), (b, d)
+
+    def height(self, width: float) -> float:
+        """Return the height of the map on a picture, at most ``HIGHEST``."""
+        x, y = self.ranges()
+        return min(HIGHEST, width * (y[1] - y[0]) / (x[1] - x[0]))
+
+    def framed(self, corner: svg.Point, width: float, height: float) -> Frame:
+        x, y = self.ranges()
+        scale = min(width / (x[1] - x[0]), height / (y[1] - y[0]))
+        wide, high = width / scale - (x[1] - x[0]), height / scale - (y[1] - y[0])
+        x, y = (x[0] - wide / 2, x[1] + wide / 2), (y[0] - high / 2, y[1] + high / 2)
+        left, top = corner
+        return Frame(Axis(*x, left, left + width), Axis(*y, top + height, top))
+
+    def surround(self, frame: Frame) -> Iterator[str]:
+        yield svg.text((frame.x.start + 2.0, frame.y.end - 5.0), self.title, "tick")
+
+
+class Bar(NamedTuple):
+    """A scale bar below the maps."""
+
+    length: float  # in coordinates of the first map
+    words: str
+    kind: str = "ink"
+
+
+def ground_bar(extent: float) -> Bar:
+    size = nice(extent / 10)
+    return Bar(size, f"ground {length(size)}")
+
+
+def length(size: float) -> str:
+    return f"{size / 1000:g} km" if size >= 1000 else f"{size:g} m" if size >= 1 else f"{size * 1000:g} mm"
+
+
+def chart(
+    name: str,
+    words: tuple[str, str, str],
+    panels: Sequence[Panel | Map],
+    *,
+    columns: int = 1,
+    height: float = 150.0,
+    heading: str = "",
+    bars: Sequence[Bar] = (),
+    north: Floats | None = None,
+) -> svg.Picture:
+    """Draw panels row by row below one legend.
+
+    words: title; caption; description for readers who cannot see it.
+    height: of a panel with axes.
+    north: direction to the north, of length 1.
+    """
+    title, caption, description = words
+    maps = all(isinstance(panel, Map) for panel in panels)
+    left, right, gap, below = (MARGIN, MARGIN, BETWEEN, 20.0) if maps else (LEFT, RIGHT, GAP, BELOW + 24.0)
+    width = (WIDTH - left - right - (columns - 1) * gap) / columns
+    drawn, y = _legend([layer for panel in panels for layer in panel.layers], heading)
+    top = max(y + 40.0, 0.0 if north is None else 80.0)
+    frames: list[Frame] = []
+    for first in range(0, len(panels), columns):
+        row = panels[first : first + columns]
+        high = max(panel.height(width) if isinstance(panel, Map) else height for panel in row)
+        for n, panel in enumerate(row):
+            frame = panel.framed((left + n * (width + gap), top), width, high)
+            frames.append(frame)
+            drawn += panel.surround(frame)
+            drawn += [each for layer in panel.layers for each in layer.draw(frame)]
+        top += high + below
+    if north is not None:
+        drawn += _north_arrow(north)
+    drawn += _bars(bars, frames[0], top + 10.0)
+    thinned = [
+        f" Of {max(len(layer.at), layer.number)} points one in {layer.every} is drawn."
+        for panel in panels
+        for layer in panel.layers
+        if isinstance(layer, Marks) and layer.every > 1
     ]
-    return [*found, *framed(unnumbered(panel), labels, title)]
+    extent = WIDTH, top + (26.0 if bars else 0.0)
+    return svg.picture(name, extent, drawn, title, caption + "".join(dict.fromkeys(thinned)), description)
 
 
-def unnumbered(panel: Panel) -> Panel:
-    """Return a panel whose lower axis has neither numbers nor lines."""
-    return panel._replace(x=panel.x._replace(numbered=False))
+def _legend(layers: Iterable[Layer], heading: str) -> tuple[list[str], float]:
+    """Draw marks and lines with their meaning, and return how far down they reach."""
+    drawn, x, y = [], LEFT, 20.0
+    if heading:
+        drawn, y = [svg.text((MARGIN, y), heading, "title")], 44.0
+    for words, layer in {layer.words: layer for layer in reversed(list(layers)) if layer.words}.items().__reversed__():
+        wide = 44.0 + LETTER * len(words)
+        if x + wide > WIDTH - 70.0 and x > LEFT:
+            x, y = LEFT, y + 22.0
+        drawn += [layer.entry(x, y), svg.text((x + 22.0, y + 4.5), words)]
+        x += wide
+    return drawn, y
 
 
-def steps(panel: Panel, values: Sequence[tuple[float, float]], kind: str) -> str:
-    """Draw a broken line through values."""
-    return svg.path([panel.at(*each) for each in values], kind)
+def _bars(bars: Iterable[Bar], frame: Frame, y: float) -> Iterator[str]:
+    x, scale = LEFT, abs(frame.x.end - frame.x.start) / (frame.x.high - frame.x.low)
+    for bar in bars:
+        length = bar.length * scale
+        yield svg.line((x, y), (x + length, y), f"bar {bar.kind}")
+        yield svg.text((x + length + 8.0, y + 4.5), bar.words)
+        x += length + 38.0 + LETTER * len(bar.words)
+
+
+def _north_arrow(direction: Floats) -> Iterator[str]:
+    """Draw an arrow to the north, its western half filled, with its letter before the tip."""
+    north = np.array([direction[0], -direction[1]])  # on the picture y goes down
+    east, origin = np.array([-north[1], north[0]]), np.array([WIDTH - 48.0, 44.0])
+    corners = (0, 18), (-9, -15), (0, -8), (9, -15)
+    tip, west, notch, right = ((origin + a * east + b * north).tolist() for a, b in corners)
+    yield svg.polygon([tip, west, notch], "north ink mark")
+    yield svg.polygon([tip, right, notch], "north ink open")
+    yield svg.text((origin + 28.0 * north + (0.0, 4.5)).tolist(), "N", "title", "middle")

@@ -1,76 +1,59 @@
-"""The picture of the plan of a strip: standard deviations along it, and where its control lies."""
+"""The plan of a strip: standard deviations along it, and where its control lies."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import numpy as np
 
-from photostrip.notes import Document
-from photostrip.report.pictures.drawing import new_figure
-from photostrip.report.pictures.style import INK, METHODS, SERIES, SMALL_TEXT, USES
+from photostrip.notes import Document, counted
+from photostrip.report.pictures.chart import Layer, Line, Marks, Panel, chart
+from photostrip.report.pictures.places import numbers
+from photostrip.report.pictures.svg import Picture
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+COLOURS = "c1", "c2", "c3", "c4", "failed", "good", "soft", "ink"  # of layouts
+DASHES = {
+    "similarity": "dotted",
+    "degree 1": "thin dotted",
+    "degree 2": "dashed",
+    "degree 3": "thin dashed",
+    "bundle": "",
+}
+USES = {"xyz": "triangle", "xy": "square", "z": "dot"}
 
 
-def strip_figure(document: Document) -> Figure:
-    rows = len(document["layouts"])
-    title = (
-        f"{document['name']}: {document['camera']['name']}, 1:{document['geometry']['scale']:g},"
-        f" {document['geometry']['photos']} photos, {document['image_sigma_um']:g} µm"
+def strip_plan_picture(document: Document) -> Picture:
+    geometry, layouts = document["geometry"], document["layouts"]
+    colour = {layout["name"]: COLOURS[n % len(COLOURS)] for n, layout in enumerate(layouts)}
+    ends = 0.5, geometry["photos"] + 0.5
+    panels = []
+    for key, part in (("plan_m", "plan"), ("z_m", "height")):
+        layers: list[Layer] = []
+        curves: dict[tuple[str, str], list[Document]] = {}
+        for row in document["along"]:
+            curves.setdefault((row["layout"], row["method"]), []).append(row)
+        for (layout, method), rows in curves.items():
+            at = np.hstack([np.arange(1.0, len(rows) + 1.0)[:, None], numbers(rows, key)])
+            layers.append(Line(at, f"{colour[layout]} {DASHES[method]}", f"{layout}, {method}"))
+        required = document["required_m"][part]
+        if required is not None:
+            limit = np.array([(end, required) for end in ends])
+            layers.append(Line(limit, "ink thin", "required"))
+        panels.append(Panel(layers, f"worst standard deviation in {part}", ("photo", "m"), x=ends, log=True))
+    shown = [(layout["name"], layout["points"]) for layout in layouts]
+    shown += [(row["control"], row["points"]) for row in document.get("placed", ()) if row["control"] == "places found"]
+    layers = []
+    for n, (_, points_of) in enumerate(shown, 1):
+        for use, shape in USES.items():
+            points = numbers([point for point in points_of if point["use"] == use], "photo", "row")
+            across = 0.6 * (points[:, 1] - 1) / (geometry["rows"] - 1) - 0.3
+            places = np.column_stack([points[:, 0], n + across])
+            layers.append(Marks(places, COLOURS[(n - 1) % len(COLOURS)], shape, size=4.0))
+    panels.append(Panel(layers, "control", ("photo", ""), x=ends, rows=[name for name, _ in shown]))
+    heading = (
+        f"{document['name']}: {document['camera']['name']}, 1:{geometry['scale']:g}, {geometry['photos']} photos, "
+        f"{document['image_sigma_um']:g} µm"
     )
-    figure = new_figure(11, 6.0 + 0.45 * rows, title)
-    parts = figure.add_gridspec(2, 1, height_ratios=[4, 1 + 0.35 * rows])
-    upper, lower = figure.add_subfigure(parts[0]), figure.add_subfigure(parts[1])
-    for place, (name, title) in enumerate((("plan_m", "plan"), ("z_m", "height")), 1):
-        axes = upper.add_subplot(1, 2, place, title=f"worst standard deviation in {title}, m")
-        _curves(axes, document, name)
-        _limit(axes, document["required_m"][title])
-        if place == 2:
-            axes.legend(fontsize=SMALL_TEXT - 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
-    _places(lower.add_subplot(1, 1, 1), document)
-    return figure
-
-
-def _curves(axes: Axes, document: Document, name: str) -> None:
-    colour = {layout["name"]: SERIES[k % len(SERIES)] for k, layout in enumerate(document["layouts"])}
-    for row in document["accuracy"]:
-        if row["used"] is None:
-            continue
-        axes.plot(
-            range(1, len(row["along"]) + 1),
-            [each[name] for each in row["along"]],
-            color=colour[row["layout"]],
-            linestyle=METHODS[row["method"]],
-            linewidth=1.1,
-            label=f"{row['layout']}, {row['method']}",
-        )
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter("{x:g}")
-    axes.tick_params(axis="y", which="both", labelsize=SMALL_TEXT)
-    axes.set_xlabel("photo")
-
-
-def _limit(axes: Axes, limit: float | None) -> None:
-    if limit is not None:
-        axes.axhline(limit, color=INK, linewidth=0.8)
-        axes.annotate("required", (1, limit), xytext=(0, 2), textcoords="offset points", fontsize=SMALL_TEXT)
-
-
-def _places(axes: Axes, document: Document) -> None:
-    """Draw where the control of each layout lies, one strip below the other."""
-    rows = document["geometry"]["rows"]
-    layouts = [(layout["name"], layout["points"]) for layout in document["layouts"]]
-    if document["placed"] is not None:
-        layouts.append(("places found", document["placed"]["points"]))
-    for number, (_, points) in enumerate(layouts):
-        for use, (marker, _) in USES.items():
-            of_use = [point for point in points if point["use"] == use]
-            x = [point["photo"] for point in of_use]
-            y = [-number + 0.3 - 0.6 * (point["row"] - 1) / (rows - 1) for point in of_use]
-            axes.scatter(x, y, marker=marker, s=18, color=SERIES[number % len(SERIES)])
-    axes.set_yticks([-number for number in range(len(layouts))], [name for name, _ in layouts], fontsize=SMALL_TEXT)
-    axes.set_xlim(0.5, document["geometry"]["photos"] + 0.5)
-    axes.set_ylim(-len(layouts) + 0.4, 0.6)
-    axes.set_xlabel("photo (triangles: control in full, squares: in plan, circles: in height)", fontsize=SMALL_TEXT + 1)
+    caption = (
+        "Worst standard deviations over each photo; triangles: control in full, squares: in plan, dots: in height."
+    )
+    words = f"Plan of {document['name']}", caption, f"{counted(len(layouts), 'layout')} of control."
+    return chart("plan-strip", words, panels, height=max(180.0, 60.0 * len(shown)), heading=heading)

@@ -134,7 +134,7 @@ def _screening(screening: Document) -> str:
         return "not searched for"
     out = ", ".join(counted(number, ONE[kind]) for kind, number in screening["rejected"].items() if number)
     test = {"tau": "tau test", "baarda": "Baarda's test"}[screening["test"]]
-    level = f"level {screening['alpha']:.2g} for one observation"
+    level = f"level {screening['alpha']:.2g} for one ray"
     text = f"{screening['method']}, {test}, {level}, limit {fixed(screening['limit'], 2)}: "
     return f"{text}{out or 'none'} rejected, {screening['readmitted']} re-admitted"
 

@@ -11,8 +11,8 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
-from photostrip.network.given_orientations import drift_columns
 from photostrip.network.hypotheses import ALL, DRIFT, HEIGHTS_ONLY, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
+from photostrip.network.observations import drift_columns
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import BundleSettings
 from photostrip.notes import Document
@@ -61,7 +61,7 @@ def bundle_of(result: Result) -> Document:
         return {}
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
-    shift = reliability.noncentrality(screened.limit.alpha, settings.power)
+    shift = screened.limit.shifts(settings.power)
     written = kinds(result.settings.angle_unit, of_models=problem.of_models)
     block: Document = {
         "free_network": solution.free,
@@ -92,9 +92,10 @@ def bundle_of(result: Result) -> Document:
         "screening": _screening(found, settings, written),
         "reliability": {
             "power": settings.power,
-            "noncentrality": shift,
+            "noncentrality": shift[reliability.IMAGE],
             "groups": Table.of_rows(
-                "bundle.reliability.groups", (_group(group, shift, written[group.kind]) for group in found.groups)
+                "bundle.reliability.groups",
+                (_group(group, shift[group.kind], written[group.kind]) for group in found.groups),
             ),
             "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in found.groups]),
             "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in found.groups]),
@@ -105,7 +106,9 @@ def bundle_of(result: Result) -> Document:
         "given": Table.joined(
             "bundle.given",
             (
-                Table.of("bundle.given", _observed(found, group, np.argwhere(known), shift, written[group.kind]))
+                Table.of(
+                    "bundle.given", _observed(found, group, np.argwhere(known), shift[group.kind], written[group.kind])
+                )
                 for group in found.groups
                 if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
             ),
@@ -272,7 +275,7 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     found = result.bundle
     if found is None or result.model_strips:
         return residuals
-    shift = reliability.noncentrality(found.screened.limit.alpha, result.settings.bundle.power)
+    shift = found.screened.limit.shifts(result.settings.bundle.power)[reliability.IMAGE]
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
     values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
     values = np.vstack([values, np.full(len(RELIABILITY), np.nan)])  # the last row: a ray that took no part
@@ -283,7 +286,9 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     return residuals.with_columns(**dict(zip(RELIABILITY, values[at].T, strict=True)))
 
 
-def _foremost(name: str, found: Bundle, shift: float, written: Mapping[str, GroupKind], values: list[Floats]) -> Table:
+def _foremost(
+    name: str, found: Bundle, shift: Mapping[str, float], written: Mapping[str, GroupKind], values: list[Floats]
+) -> Table:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
     for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
@@ -295,9 +300,8 @@ def _foremost(name: str, found: Bundle, shift: float, written: Mapping[str, Grou
     for _, number, at in sorted(chosen)[:SHOWN]:
         group = found.groups[number]
         place = np.array([divmod(at, group.sigma.shape[1])])
-        rows.append(
-            {key: column[0] for key, column in _observed(found, group, place, shift, written[group.kind]).items()}
-        )
+        columns = _observed(found, group, place, shift[group.kind], written[group.kind])
+        rows.append({key: column[0] for key, column in columns.items()})
     return Table.of_rows(f"bundle.reliability.{name}", rows)
 
 

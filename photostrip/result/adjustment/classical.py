@@ -17,7 +17,7 @@ from photostrip.result.numbers import rms
 from photostrip.result.points.given import differences, of_used
 from photostrip.result.quantities import record
 from photostrip.result.table import Table
-from photostrip.strip.polynomial.terms import degree_of
+from photostrip.strip.polynomial_terms import degree_of
 
 
 def classical_of(result: Result) -> Document:

@@ -12,7 +12,7 @@ from photostrip.arrays import Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.planning.model.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
+from photostrip.planning.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
 from photostrip.result.table import Table
 from photostrip.statistics import t_p_value

@@ -67,7 +67,7 @@ def links_of(result: Result) -> Table:
 
 
 def _links(result: Result, strip: StripResult) -> list[Document]:
-    from photostrip.strip.independent_models.link_screening import detectable  # strips of photos need none
+    from photostrip.strip.independent_models.linking import detectable
 
     formed, names = strip.of_models.formed, strip.of_models.strip.models
     links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved

@@ -12,9 +12,9 @@ from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.numbers import order_of
 from photostrip.result.table import Table
-from photostrip.strip.gross_errors.pairs.global_test import GlobalTest, residual_sigma
-from photostrip.strip.gross_errors.pairs.screening import SEARCHES, tested
-from photostrip.strip.gross_errors.pairs.screening import stages as tests_of
+from photostrip.strip.gross_errors.pair_screening import SEARCHES, tested
+from photostrip.strip.gross_errors.pair_screening import stages as tests_of
+from photostrip.strip.gross_errors.pair_search import GlobalTest, residual_sigma
 from photostrip.strip.relative_orientation.orientation import Orientation, RelativeSettings
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.strip.relative_orientation.solution import ELEMENTS

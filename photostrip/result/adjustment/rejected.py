@@ -8,8 +8,8 @@ from itertools import repeat
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
-from photostrip.network.gross_errors.ray_log import START
 from photostrip.network.problem import BundleProblem
+from photostrip.network.testing import START
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result, StripResult
 from photostrip.points import PhotoPoints
@@ -20,7 +20,7 @@ from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Plain, natural, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT
 from photostrip.result.table import Table
-from photostrip.strip.gross_errors.control.control_rejections import EITHER, EXCHANGED
+from photostrip.strip.gross_errors.control_screening import EITHER, EXCHANGED
 from photostrip.strip.strip_formation.scale_transfer import depths
 from photostrip.strip.strip_formation.strip import model_points
 from photostrip.units import MICROMETRES

@@ -18,7 +18,7 @@ from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import COVARIANCES, SIGMAS, centre_columns, photo_columns
 from photostrip.result.quantities import MATRIX, angle_decimals
 from photostrip.result.table import Table
-from photostrip.strip.resection.collinearity import depths, project
+from photostrip.strip.resection import depths, project
 
 ANGLES = ("angle_1", "angle_2", "angle_3")
 

@@ -17,7 +17,7 @@ from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import record
 from photostrip.result.table import Table
 from photostrip.statistics import chi2_quantile, normal_quantile, squares_p_value
-from photostrip.strip.error_propagation.check_errors import CheckErrors
+from photostrip.strip.fitted_strip import CheckErrors
 
 ROWS, COLUMNS = np.triu_indices(6)
 COVARIANCES = tuple(f"c{row + 1}{column + 1}" for row, column in zip(ROWS.tolist(), COLUMNS.tolist(), strict=True))

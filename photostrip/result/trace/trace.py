@@ -18,7 +18,7 @@ from photostrip.result.table import rows_of
 from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.strip import absolute_orientation
-from photostrip.strip.polynomial.terms import POWERS
+from photostrip.strip.polynomial_terms import POWERS
 from photostrip.strip.relative_orientation.solution import ELEMENTS
 from photostrip.strip.strip_formation.strip import FirstPhoto, base_angles, intersect_models
 

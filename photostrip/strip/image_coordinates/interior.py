@@ -21,8 +21,8 @@ from photostrip.errors import Fault, InputError
 from photostrip.geometry import plane
 from photostrip.notes import Note, named
 from photostrip.points import PhotoPoints
+from photostrip.strip.image_coordinates.corrections import InteriorSettings
 from photostrip.strip.image_coordinates.fiducial_marks import QUARTER, Marks, enough, fault, gather, right_pattern
-from photostrip.strip.image_coordinates.settings import InteriorSettings
 
 SHAPE = ("scale_x", "scale_y", "rotation", "shear")
 TUPLES, ARRAYS = ("photo_ids", "transforms", "marks", "residuals"), ("sigma0", "redundancy", *SHAPE, "mirrored")

@@ -1,7 +1,8 @@
 """A strip of independent models: neighbouring models linked by similarities, one behind the other.
 
 In come the model coordinates of a strip (``StripModels``), out comes the formed strip with its links and their tests
-(``FormedModels``), which takes the place of a strip formed from photos. ``linking`` solves all links,
-``link_screening`` takes gross errors out, ``formation`` chains them, the start of their network;
-``perspective_centers`` moves centres with a polynomial. Source: [001] eq. 145-149; docs/independent-models.md.
+(``FormedModels``), which takes the place of a strip formed from photos. ``linking`` solves all links
+and takes gross errors out, ``formation`` chains them, the start of their network.
+
+Source: [001] eq. 145-149; docs/independent-models.md.
 """

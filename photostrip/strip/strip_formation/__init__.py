@@ -3,7 +3,7 @@
 Comes in: the ``Orientation`` of all pairs. Goes out: a ``FormedStrip`` with perspective centres, rotations, the scale
 of each model, the coordinates of all points and the ``Junctions`` at which models were joined. ``intersection`` makes
 model points, ``scale_transfer`` brings neighbouring models to one scale on their pass points, ``strip`` hands the
-orientation on, ``non_neighbours`` adds points without a model.
+orientation on.
 
 Source: [001] eq. 125-141.
 """

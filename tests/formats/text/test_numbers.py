@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from photostrip.formats.text.numbers import LARGEST_NUMBER, NotANumber, number, shown
-from photostrip.formats.text.rows import SplitRows
+from photostrip.formats.text.table_reader import floats
 from tests.loops import nonempty
 
 
@@ -88,7 +88,7 @@ def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: li
             return False
         return True
 
-    fast = SplitRows([column]).numbers(0)
+    fast = floats(column)
     if fast is None:
         return
     assert all(map(is_number, column))
@@ -97,7 +97,7 @@ def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: li
 
 @given(st.lists(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER), min_size=1))
 def test_a_column_of_numbers_is_converted_at_once(values: list[float]) -> None:
-    fast = SplitRows([list(map(repr, values))]).numbers(0)
+    fast = floats(list(map(repr, values)))
     assert fast is not None
     assert all(
         math.copysign(1, a) == math.copysign(1, b) and a == b for a, b in nonempty(zip(fast, values, strict=True))

@@ -43,7 +43,6 @@ def write(path: Path, text: str | bytes) -> Path:
 @pytest.mark.parametrize("chunk", [1, 2, 3, 1000])
 def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
     monkeypatch.setattr(table_reader, "CHUNK", chunk)
-    monkeypatch.setattr(table_text, "BLOCK", 10 * chunk)
     rows = [(f"p{i % 3}", f"Q{i}", i / 7, -i / 3) for i in range(10)]
     text = HEADER + "\n".join(",".join(map(str, row)) + "\n" * (i % 2) for i, row in enumerate(rows))
     findings = Findings()
@@ -238,3 +237,18 @@ def test_ids_in_a_sentence() -> None:
 def test_semicolons_are_named_though_a_head_has_a_comma(tmp_path: Path) -> None:
     (fault,) = faults(write(tmp_path / "o.csv", "photo;point;x, mm;y\n1;P;2;3\n"))
     assert "fields are separated by semicolons" in fault
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
+def test_rows_of_all_line_ends_with_and_without_quotes_make_one_table(tmp_path: Path, ending: str) -> None:
+    lines = ["photo,point,x,y", "1,A,1.5,2", "2,Ä,1,2e0", "3,中,-0.25,4", '"4","A,B", 1,2', "", "5,C,1,x", "6,D,1,2"]
+    path = tmp_path / "o.csv"
+    path.write_bytes(ending.join(lines).encode())
+    findings = Findings()
+    read = read_measurements([str(path)], findings)
+    assert read is not None
+    assert [read.photo_ids[code] for code in read.photo] == ["1", "2", "3", "4", "5", "6"]
+    assert [read.target_ids[code] for code in read.target] == ["A", "Ä", "中", "A,B", "C", "D"]
+    assert read.xy[:4].tolist() == [[1.5, 2.0], [1.0, 2.0], [-0.25, 4.0], [1.0, 2.0]]
+    assert read.table.lines.tolist() == [2, 3, 4, 5, 7, 8]
+    assert [(fault.line, fault.column) for fault in findings.faults] == [(7, 7)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,17 +13,12 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.network.gross_errors import point_decisions
-from photostrip.network.gross_errors.point_decisions import (
-    CAUSES,
-    Decisions,
-    PointRays,
-)
+from photostrip.network import testing
 from photostrip.network.reliability import Limit
-from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
-from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors.pairs.deletion import LIKELIER
-from photostrip.strip.resection.collinearity import KnownPhotos, derivatives
+from photostrip.network.testing import CAUSES, Decisions, PointRays
+from photostrip.rejection import SEVERAL_RAYS, WRONG_RAY
+from photostrip.statistics import normal_quantile
+from photostrip.strip.resection import KnownPhotos, derivatives
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -36,7 +30,8 @@ SEEDS = st.integers(0, 2**31)
 
 
 def limit(alpha: float = ALPHA) -> Limit:
-    return Limit(normal_quantile(1 - alpha / 2), normal_quantile(1 - alpha / 4), alpha, 1.0)
+    value, both = (normal_quantile(1 - level / 2) for level in (alpha, alpha / 2))
+    return Limit(value=value, both=both, given=value, alpha=alpha, alpha_of_given=alpha, unit=1.0)
 
 
 def a_point(seed: int, rays: int = 3) -> PointRays:
@@ -73,7 +68,7 @@ def each_of(decided: Decisions) -> list[Decision]:
 
 def decide(point: PointRays, limit: Limit) -> Decision:
     """Decide on one point."""
-    (found,) = each_of(point_decisions.decide(together(point), limit))
+    (found,) = each_of(testing.decide(together(point), limit))
     return found
 
 
@@ -91,9 +86,7 @@ def together(*points: PointRays) -> PointRays:
 def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[Floats, Floats]:
     """Take sets of rays of one point out: sums of squares (s,) and errors (s, k, 2)."""
     normal = basis @ weight @ basis.T
-    found = point_decisions._without(
-        np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2
-    )
+    found = testing._without(np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2)
     return found.left[0], found.errors[0]
 
 
@@ -101,8 +94,8 @@ def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[
 def test_sets_of_many_points_are_taken_out_as_one_by_one(count: int) -> None:
     random = np.random.default_rng(count)
     root, pulled, total = random.normal(size=(5, 12, 15)), random.normal(size=(5, 12)), random.normal(size=5)
-    normal, sets = root @ root.swapaxes(1, 2), point_decisions.ray_sets(6, count).rays
-    left, errors = point_decisions._without(total, pulled, normal, sets, 2)
+    normal, sets = root @ root.swapaxes(1, 2), testing.ray_sets(6, count).rays
+    left, errors = testing._without(total, pulled, normal, sets, 2)
     for point, (row, rays) in nonempty(itertools.product(range(5), enumerate(sets))):
         at = (2 * rays[:, None] + np.arange(2)).ravel()
         error = np.linalg.solve(normal[point][np.ix_(at, at)], pulled[point, at])
@@ -141,15 +134,15 @@ def test_a_point_that_took_part_is_predicted_as_if_it_had_not(rays: int, gone: t
         inside=rows,
         misfit=point.misfit - by_photos @ shift[: 6 * rays] - point.by_point @ shift[6 * rays :],
     )
-    expected = point_decisions._misclosures(replace(point, of_photos=by_photos @ before @ by_photos.T))
-    found = point_decisions._misclosures(after)
+    expected = testing._misclosures(replace(point, of_photos=by_photos @ before @ by_photos.T))
+    found = testing._misclosures(after)
     assert found.gap == pytest.approx(expected.gap, rel=1e-5, abs=1e-5)
     assert found.weight == pytest.approx(expected.weight, rel=1e-5, abs=1e-7)
 
 
 def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() -> None:
     point = a_point(3, 5)
-    gap, weight, basis = point_decisions._misclosures(point)
+    gap, weight, basis = testing._misclosures(point)
     sets = [(0,), (3,), (4,)]
     left, errors = without(gap, weight, basis, np.array(sets))
     for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
@@ -186,142 +179,3 @@ def test_of_three_rays_the_wrong_one_is_found_across_the_base_and_not_along(
     assert along.cause in {WRONG_RAY, SEVERAL_RAYS}
     assert along.out[place]
     assert along.out.all() == (along.cause == SEVERAL_RAYS)
-
-
-def test_two_rays_that_do_not_meet_are_both_left_out() -> None:
-    found = decide(spoiled(a_point(5, 2), {(0, 1): 30.0}), limit())
-    assert found.out.tolist() == [True, True]
-    assert found.cause == TWO_RAYS
-    assert found.size[:, 1] == pytest.approx([15.0, -15.0], abs=2.0)  # half of the y parallax each
-
-
-def with_control(point: PointRays, axes: slice) -> PointRays:
-    """Give the point some of its three coordinates."""
-    known = np.eye(3)[axes] * 1e5
-    return replace(
-        point,
-        misfit=np.append(point.misfit, np.zeros(len(known))),
-        by_point=np.concatenate([point.by_point, known]),
-        of_photos=np.pad(point.of_photos, (0, len(known))),
-        inside=np.append(point.inside, np.zeros(len(known), bool)),
-    )
-
-
-def test_control_says_which_of_two_rays_is_wrong() -> None:
-    point = spoiled(a_point(5, 2), {(0, 0): 30.0})
-    assert not decide(point, limit()).out.any()  # an error along the base shows nowhere
-    found = decide(with_control(point, slice(0, 3)), limit())
-    assert found.out.tolist() == [True, False]
-    assert found.size[0, 0] == pytest.approx(30.0, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("rays", "axes", "cause"),
-    [
-        pytest.param(1, slice(0, 3), WRONG_RAY, id="one ray, given in full"),
-        pytest.param(2, slice(2, 3), TWO_RAYS, id="two rays, given in height"),
-    ],
-)
-def test_little_control_finds_an_error_and_cannot_tell_the_ray(rays: int, axes: slice, cause: str) -> None:
-    found = decide(with_control(spoiled(a_point(5, rays), {(0, 1): 40.0}), axes), limit())
-    assert found.out.all()
-    assert found.cause == cause
-    assert found.size.shape == (rays, 2)
-    assert np.isfinite(found.size).all()
-
-
-@pytest.mark.parametrize(("wrong", "cause"), [(1, WRONG_RAY), (2, WRONG_RAY), (3, WRONG_RAY), (4, SEVERAL_RAYS)])
-def test_sets_of_up_to_three_rays_are_looked_for(wrong: int, cause: str) -> None:
-    errors = {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(wrong)}
-    found = decide(spoiled(a_point(11, 9), errors), limit())
-    assert found.cause == cause
-    assert found.out.sum() == (wrong if cause == WRONG_RAY else 9)
-
-
-@pytest.mark.parametrize(("times", "cause"), [(0.75, SEVERAL_RAYS), (1.5, WRONG_RAY)])
-def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float, cause: str) -> None:
-    """An error along y of a ray, as large as makes the next best ray worse by a multiple of the limit."""
-    point = a_point(2)
-    level = Limit(1.0, 1.0, 1e-12, 1.0)  # nearly any scatter of the rest is allowed: the comparison decides alone
-
-    def next_best(size: float) -> float:
-        gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
-        left, _ = without(gap, weight, basis, np.arange(3)[:, None])
-        return float(np.partition(left, 1)[1] - left.min())
-
-    size = np.sqrt(times * LIKELIER / next_best(1.0))
-    assert next_best(size) == pytest.approx(times * 9.0)
-    assert next_best(size) < chi2_quantile(1 - level.alpha, 1)
-    assert decide(spoiled(point, {(0, 1): size}, 0.0), level).cause == cause
-
-
-def test_points_are_decided_on_together_as_one_by_one() -> None:
-    """Good points and points with one, two and too many wrong rays, that took part and that did not, in one batch."""
-    errors: list[dict[tuple[int, int], float]] = [
-        {},
-        {(0, 1): 60.0},
-        {(1, 1): 60.0, (3, 1): -90.0},
-        {(ray, 1): 50.0 * 2**ray for ray in range(4)},
-    ]
-    points = [spoiled(a_point(seed, 5), each, 1.0) for seed, each in enumerate(errors * 2)]
-    root = np.random.default_rng(1).normal(0, 0.1, (10, 10))
-    points = [
-        replace(each, of_photos=root @ root.T, inside=np.arange(10) < size) for size, each in enumerate(points, 2)
-    ]
-    decided = each_of(point_decisions.decide(together(*points), limit()))
-    for found, point in nonempty(zip(decided, points, strict=True)):
-        alone = decide(point, limit())
-        assert (found.out.tolist(), found.cause) == (alone.out.tolist(), alone.cause)
-        assert found.value == pytest.approx(alone.value)
-        assert found.size == pytest.approx(alone.size, nan_ok=True)
-    assert {each.cause for each in decided} == {"", WRONG_RAY, SEVERAL_RAYS}
-
-
-def test_points_with_as_many_rays_are_taken_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(point_decisions, "RAYS_AT_ONCE", 12)
-    sizes = [(2, 0), (3, 0), (2, 3), (3, 0), (20, 0)] * 6
-    rays, known = np.array(sizes).T
-    found = [each.tolist() for each in point_decisions.alike(rays, known)]
-    assert [len(each) for each in found] == [6, 6, 4, 4, 4, *[1] * 6]
-    assert sorted(place for each in found for place in each) == list(range(len(sizes)))
-    assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
-
-
-@pytest.mark.parametrize(("rays", "cause"), [(2, TWO_RAYS), (3, SEVERAL_RAYS)])
-def test_rays_that_meet_nowhere_are_left_out(rays: int, cause: str) -> None:
-    decided = point_decisions.decide(together(*(spoiled(a_point(seed, rays), {}) for seed in (1, 2))), limit())
-    good, nowhere = each_of(point_decisions.without_place(decided, np.array([False, True])))
-    assert not good.cause
-    assert not good.out.any()
-    assert good.value == decided.value[0]
-    assert nowhere.cause == cause
-    assert nowhere.out.all()
-    assert np.isnan([nowhere.value, *nowhere.size.ravel()]).all()
-
-
-@pytest.mark.parametrize(("rays", "count"), [(2, 1), (5, 2), (6, 3)])
-def test_every_ray_knows_the_sets_that_it_is_in(rays: int, count: int) -> None:
-    sets = point_decisions.ray_sets(rays, count)
-    assert sets.of_ray.shape == (rays, math.comb(rays - 1, count - 1))
-    assert (sets.rays[sets.of_ray, sets.place] == np.arange(rays)[:, None]).all()
-    assert all(len(set(each)) == len(each) for each in nonempty(sets.of_ray.tolist()))
-
-
-def test_the_likeliest_set_with_a_ray_says_its_error() -> None:
-    """Four of nine wrong: no set of three is enough, and all rays go, each with the error it would have."""
-    point = spoiled(a_point(11, 9), {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(4)})
-    found, (gap, weight, basis) = decide(point, limit()), point_decisions._misclosures(point)
-    sets = point_decisions.ray_sets(9, 3).rays
-    left, errors = without(gap, weight, basis, sets)
-    for ray, size in nonempty(enumerate(found.size)):
-        best = min((value, row) for row, value in enumerate(left) if ray in sets[row])[1]
-        assert size == pytest.approx(errors[best, sets[best].tolist().index(ray)], rel=1e-9)
-
-
-def test_a_point_that_holds_its_photos_alone_tests_nothing() -> None:
-    """The photos take all of its misclosures: what is left of their weight is a billionth."""
-    point = a_point(6, 2)
-    basis = np.linalg.qr(point.by_point, mode="complete")[0][:, 3:]
-    held = replace(point, of_photos=basis @ basis.T, inside=np.ones(4, bool))
-    assert point_decisions._misclosures(held).weight[0, 0] == pytest.approx(1e-9, rel=0.01)
-    assert not decide(held, limit()).out.any()

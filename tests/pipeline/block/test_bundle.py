@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.pipeline.inputs import Settings, Strip
-from photostrip.pipeline.run import triangulate
-from photostrip.points import PhotoPoints
+from photostrip.pipeline.inputs import Strip
 from photostrip.result.document import document_of
-from photostrip.simulation import Control, Flight, Ground, Image, Points, Spec, Terrain
-from photostrip.strip.polynomial.correction import PolynomialSettings
+from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 from tests.simulated import inputs_of
 
@@ -67,16 +64,6 @@ def test_without_noise_the_truth_comes_back(title: str) -> None:
         [s.intermediate.cartesian_from_intermediate(s.of_photos.resection.centers) for s in result.strips]
     )
     assert np.abs(centers - simulation.truth.centers).max() < MICROMETRE
-
-
-def test_a_long_strip_with_control_at_one_end_starts_where_polynomials_tear_it() -> None:
-    simulation = simulate(Spec(flight=Flight(photos=200), control=Control(every=1)))
-    given = replace(simulation.control, check=np.arange(len(simulation.control)) >= 15)
-    settings = Settings(adjustment="bundle", polynomial=PolynomialSettings("3"))
-    result = triangulate(replace(inputs_of(simulation), control=given), settings)
-    assert result.precision is not None
-    off, sigmas = errors(simulation, result), np.sqrt(np.diagonal(result.precision.points, axis1=1, axis2=2))
-    assert 0.3 < np.sqrt(np.mean((off / sigmas) ** 2)) < 2.0
 
 
 def heights(given: CameraPositions) -> CameraPositions:
@@ -149,16 +136,6 @@ def test_offset_and_drift_are_found_as_they_are() -> None:
         assert abs(found[f"positions B: offset {name}"]) < 1e-4
 
 
-def test_approximate_orientations_give_the_frame_and_no_more() -> None:
-    simulation = simulate(BLOCK)
-    inputs = replace(with_control(simulation, []), orientations=orientations(simulation, observed=False))
-    result = adjusted(simulation, inputs)
-    assert np.abs(errors(simulation, result)).max() < 1e-4  # true here; inner constraints keep the start
-    assert result.bundle is not None
-    assert result.bundle.screened.solution.free
-    assert [note.code for note in result.notes if note.severity == "warning"] == ["free-network"]
-
-
 def test_a_free_network_has_the_shape_of_the_truth() -> None:
     simulation = simulate(BLOCK)
     result = adjusted(simulation, with_control(simulation, []))
@@ -217,45 +194,6 @@ def test_what_is_not_determined_is_named(words: str) -> None:
         adjusted(simulation, given(simulation))
 
 
-def test_a_strip_apart_is_named() -> None:
-    """Two strips that share no point; only the first has control."""
-    simulation = simulate(exact(flight=Flight(photos=6, strips=2)))
-    seen = simulation.observations
-    first = np.array([name in simulation.strips[0][1] for name in seen.photo_ids])[seen.photo]
-    of_first = np.isin(seen.point, seen.point[first])
-    rows = first | ~of_first
-    cut = PhotoPoints(
-        seen.photo_ids, seen.point_ids, seen.photo[rows], seen.point[rows], seen.xy[rows], seen.sigma[rows]
-    )
-    names = [seen.point_ids[n] for n in np.unique(seen.point[first])]
-    with pytest.raises(GeometryError, match="strip B: neither control"):
-        adjusted(simulation, replace(with_control(simulation, names), observations=cut))
-
-
-@pytest.mark.slow
-def test_check_points_do_not_influence_a_bundle() -> None:
-    simulation = simulate(Spec(flight=Flight(photos=6, strips=2)))
-    inputs = inputs_of(simulation)
-    moved = np.where(inputs.control.check[:, None], inputs.control.enu + 100.0, inputs.control.enu)
-    results = [
-        adjusted(simulation, each) for each in (inputs, replace(inputs, control=replace(inputs.control, enu=moved)))
-    ]
-    assert np.array_equal(results[0].points.cartesian, results[1].points.cartesian)
-
-
-@pytest.mark.slow
-def test_a_strip_that_polynomials_leave_kilometres_off_starts_without_them() -> None:
-    spec = Spec(
-        flight=Flight(photos=400, end_lap_percent=62.0, heading_deg=0.0, scale=1500.0),
-        points=Points(rows=5, extra_per_model=2, reach_percent=75.0),
-        control=Control(every=200, check=0),
-        image=Image(sigma_um=300.0),
-    )
-    bundle = adjusted(simulate(spec)).bundle
-    assert bundle is not None
-    assert bundle.screened.solution.sigma0 == pytest.approx(1.0, abs=0.03)
-
-
 @pytest.mark.slow
 def test_sigma0_and_precision_are_those_of_the_noise() -> None:
     """Errors in units of the stated precision, over blocks of 200 points; limits on both sides."""
@@ -273,41 +211,3 @@ def test_sigma0_and_precision_are_those_of_the_noise() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)  # errors of neighbouring points go together
     assert np.mean(sigma0) == pytest.approx(1.0, abs=0.03)
     assert min(squares) > 150
-
-
-@pytest.mark.slow
-def test_stated_standard_deviations_that_are_wrong_are_told() -> None:
-    simulation = simulate(Spec(flight=Flight(photos=6, strips=2), image=Image(sigma_um=5.0)))
-    inputs = inputs_of(simulation)
-    observations = replace(inputs.observations, sigma=inputs.observations.sigma / 2)
-    result = adjusted(simulation, replace(inputs, observations=observations))
-    assert any(note.code == "unit-weight" and "too small" in note.message for note in result.notes)
-
-
-@pytest.mark.parametrize(
-    ("group", "correction", "names"),
-    [
-        ("strip", "offset", ["positions A: offset up", "positions B: offset up"]),
-        ("block", "offset", ["positions of the block: offset up"]),
-        ("block", "drift", ["positions of the block: offset up", "positions of the block: drift up"]),
-    ],
-)
-def test_heights_have_an_offset_in_height_alone(group: str, correction: str, names: list[str]) -> None:
-    simulation = simulate(exact(flight=Flight(photos=5, strips=2)))
-    given = replace(heights(positions(simulation, shift=4.0, correction=correction)), group=group)
-    result = adjusted(simulation, replace(with_control(simulation, corners(simulation)), positions=given))
-    corrections = document_of(result)["bundle"]["corrections"]
-    assert [row["name"] for row in corrections] == names
-    assert corrections[0]["value"] == pytest.approx(-4.0, abs=1e-5)
-
-
-def test_a_strip_whose_positions_are_switched_off_has_no_offset() -> None:
-    simulation = simulate(exact(flight=Flight(photos=5, strips=2)))
-    given = positions(simulation, shift=4.0, correction="drift")
-    use = given.use.copy()
-    use[5:] = False
-    use[1:5, 0] = False  # of a single coordinate an offset, no drift
-    inputs = replace(with_control(simulation, corners(simulation)), positions=replace(given, use=use))
-    corrections = document_of(adjusted(simulation, inputs))["bundle"]["corrections"]
-    names = [row["name"].removeprefix("positions A: ") for row in corrections]
-    assert names == ["offset east", "offset north", "offset up", "drift north", "drift up"]

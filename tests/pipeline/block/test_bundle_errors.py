@@ -10,13 +10,12 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.network import reliability
-from photostrip.network.solve import solve
-from photostrip.pipeline.run import triangulate
+from photostrip.network.adjustment import solve
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
-from tests.simulated import inputs_of, settings_of
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
@@ -54,26 +53,6 @@ def test_gross_errors_are_found_and_named() -> None:
 
 
 @pytest.mark.slow
-def test_the_size_of_an_error_is_estimated() -> None:
-    simulation = simulate(BLOCK)
-    inputs = inputs_of(simulation)
-    seen = inputs.observations
-    row = 100
-    xy = seen.xy.copy()
-    xy[row, 1] += 0.080
-    result = adjusted(simulation, replace(inputs, observations=replace(seen, xy=xy)))
-    photo, point = seen.photo_ids[seen.photo[row]], seen.point_ids[seen.point[row]]
-    told = [
-        r
-        for r in document_of(result)["rejected"]
-        if (r["photo"], r["point"]) == (photo, point) and r["stage"] == "bundle"
-    ]
-    assert result.bundle is not None
-    assert abs(told[0]["size"]) == pytest.approx(80.0, abs=35.0)
-    assert told[0]["size_unit"] == "um"
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["snooping", "robust"])
 def test_many_errors_at_once(method: str) -> None:
     spec = replace(BLOCK, gross_errors=(GrossError("image", count=30, size_um=400.0, axis="y"),))
@@ -85,23 +64,6 @@ def test_many_errors_at_once(method: str) -> None:
     assert not wrong & used
     assert len(used) > 0.85 * (len(result.inputs.observations) - len(wrong))  # a wrong ray of two takes the other along
     assert np.sqrt((errors(simulation, result) ** 2).mean()) < 0.15
-
-
-@pytest.mark.slow
-def test_control_left_out_in_turn_starts_from_the_rays_that_are_left() -> None:
-    """Fewer adjustments than the run without the point, and the same rays take part."""
-    few = replace(BLOCK, flight=Flight(photos=5, strips=2), control=Control(layout="corners"))  # a fold for each point
-    simulation = simulate(replace(few, gross_errors=(GrossError("image", count=36, size_um=400.0, axis="y"),)))
-    inputs, settings = inputs_of(simulation), replace(settings_of(simulation), adjustment="bundle")
-    folds = triangulate(inputs, replace(settings, cross_validation=True)).folds
-    for fold in nonempty(folds[:2]):
-        check = inputs.control.check | np.isin(inputs.control.ids, fold.left_out)
-        alone = triangulate(replace(inputs, control=replace(inputs.control, check=check)), settings)
-        assert fold.result is not None
-        assert fold.result.bundle is not None
-        assert alone.bundle is not None
-        assert rays_of(fold.result) == rays_of(alone)
-        assert fold.result.bundle.screened.rounds < alone.bundle.screened.rounds
 
 
 @pytest.mark.slow
@@ -146,36 +108,7 @@ def test_good_measurements_stay(alpha: float | None, share: float) -> None:
     assert out <= share * total
 
 
-@pytest.mark.slow
-def test_what_the_user_keeps_stays() -> None:
-    simulation = simulate(replace(BLOCK, gross_errors=(GrossError("image", count=1, size_um=120.0),)))
-    (error,) = simulation.truth.errors
-    inputs = inputs_of(simulation)
-    from photostrip.pipeline.run import triangulate
-    from tests.simulated import settings_of
-
-    settings = replace(settings_of(simulation), adjustment="bundle")
-    keep = replace(settings, relative=replace(settings.relative, keep=[f"{error.photo}/{error.point}"]))
-    result = triangulate(inputs, keep)
-    assert result.bundle is not None
-    block = result.bundle.block
-    row = np.flatnonzero(block.kept)
-    assert len(row) == 1
-    assert result.bundle.screened.selection.images[row[0]]
-
-
 # ---------------------------------------------------------------------------------------------- what theory says
-
-
-@pytest.mark.slow
-def test_redundancy_numbers_sum_to_the_redundancy() -> None:
-    simulation = simulate(BLOCK)
-    noise = np.random.default_rng(2).normal(size=(16, 3)) * 0.05
-    inputs = replace(inputs_of(simulation), positions=positions(simulation, noise=noise))
-    result = adjusted(simulation, inputs, screening="none")
-    assert result.bundle is not None
-    total = sum(float(np.nansum(group.redundancy)) for group in result.bundle.groups)
-    assert total == pytest.approx(result.bundle.screened.solution.redundancy, abs=1e-6)
 
 
 def test_the_shift_of_the_test_and_its_limits() -> None:
@@ -269,15 +202,6 @@ def test_variance_components_find_what_was_misstated() -> None:
     assert mean["positions height"] == pytest.approx(4.0, rel=0.20)
 
 
-def test_a_group_without_redundancy_is_not_estimated() -> None:
-    simulation = simulate(Spec(flight=Flight(photos=4), control=Control(bands=2, per_band=2)))
-    found = document_of(adjusted(simulation, variance_components=True))["bundle"]["variance_components"]
-    groups = {each["group"]: each for each in found}
-    assert groups["image"]["estimated"]
-    assert not groups["control height"]["estimated"]
-    assert groups["control height"]["factor"] == 1.0
-
-
 # ------------------------------------------------------------------------------------------------ self-calibration
 
 
@@ -315,28 +239,6 @@ def test_a_wrong_calibration_is_found() -> None:
     assert np.sqrt((errors(simulation, result) ** 2).mean()) < 0.08
     _, without = calibrated(CROSSED, wrong, (), search_cameras=False)
     assert np.sqrt((errors(simulation, without) ** 2).mean()) > np.sqrt((errors(simulation, result) ** 2).mean())
-
-
-@pytest.mark.slow
-def test_parameters_that_are_nothing_are_told() -> None:
-    _, result = calibrated(CROSSED, {}, ("k1", "p1", "affinity"))
-    assert result.bundle is not None
-    dull = [each for each in result.bundle.parameters if not each.significant]
-    assert len(dull) >= 2
-    assert sum(note.code == "calibration-insignificant" for note in result.notes) == len(dull)
-
-
-def test_a_priori_values_hold_what_is_not_determined() -> None:
-    """Without camera positions and relief the principal distance goes with the flying height."""
-    spec = replace(CROSSED, flight=Flight(photos=5))
-    simulation = simulate(spec)
-    inputs = inputs_of(simulation)
-    strips = tuple(replace(strip, calibrate=("principal_distance",)) for strip in inputs.strips)
-    result = adjusted(simulation, replace(inputs, strips=strips), calibration_sigma={"principal_distance": 0.001})
-    assert result.bundle is not None
-    (found,) = result.bundle.parameters
-    assert found.redundancy < 0.05  # the measurements say next to nothing
-    assert found.sigma == pytest.approx(0.001 * result.bundle.unit, rel=0.05)
 
 
 @pytest.mark.slow

@@ -97,14 +97,6 @@ def test_gross_errors_are_no_error_of_a_camera() -> None:
 
 
 @pytest.mark.slow
-def test_a_lens_is_told_among_gross_errors() -> None:
-    wrong = (GrossError("image", count=8, size_um=300.0), GrossError("control", count=1, size_m=3.0))
-    result = adjusted(simulate(replace(strip(42, 20, *wrong), camera=replace(FILM, distortion=LENS))))
-    assert taken_up(result) == ["k1"]
-    assert control_lost(result) <= 3
-
-
-@pytest.mark.slow
 def test_a_lens_that_nobody_calibrated_costs_no_more_than_one_that_is_asked_for() -> None:
     """Three strips of a drone, turned by ten degrees: f 1 % off, the principal point 0.1 mm, k1 and k2 unstated."""
     stated = Camera("uav", principal_distance=8.8, format=(13.2, 8.8), pixel_size=0.0024)

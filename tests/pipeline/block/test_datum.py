@@ -12,9 +12,9 @@ import pytest
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.network.defects import GROWN, LOOSE
-from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
+from photostrip.simulation import Control, Flight, Ground, Spec
 from tests.loops import nonempty
-from tests.pipeline.blocks import adjusted, errors, orientations, photos_of, positions, simulate, with_control
+from tests.pipeline.blocks import adjusted, errors, photos_of, positions, simulate, with_control
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -108,19 +108,6 @@ def test_an_unknown_error_of_the_cameras_takes_away_what_it_replaces(
     judge(simulation, with_some(simulation, control, cameras, correction, group))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_over_a_plain_plan_and_heights_of_one_flight_line_leave_its_roll_open(seed: int) -> None:
-    """Half a degree of roll shortens the plan across the flight by less than its errors: no more is known of it."""
-    simulation = simulate(replace(STRAIGHT, seed=seed, terrain=Terrain(relief=0.0)))
-    words = "hardly determines roll about the flight line"
-    try:
-        result = adjusted(simulation, with_some(simulation, "xy", "z"))
-    except GeometryError as error:
-        assert words in str(error)  # noqa: PT017
-    else:
-        assert any(note.code == "weak-datum" and words in note.message for note in result.notes)
-
-
 def judge(simulation: Simulation, inputs: Inputs) -> None:
     truth = truth_of(simulation, inputs)
     if truth.loose > 1.0:
@@ -138,17 +125,6 @@ def judge(simulation: Simulation, inputs: Inputs) -> None:
     weak = [note.message for note in result.notes if note.code == "weak-datum"]
     assert bool(weak) == (truth.grown > GROWN)
     assert all("hardly determines roll about the flight line" in text for text in weak)
-
-
-def test_wide_orientations_of_three_photos_are_a_datum() -> None:
-    """Eighteen coordinates and angles are given, if to a third of a base: they say more than nothing."""
-    simulation = simulate(Spec(ground=LOCAL, flight=Flight(photos=3)))
-    given = replace(orientations(simulation, observed=True), sigma=np.full((3, 3), 300.0))
-    inputs = replace(with_control(simulation, []), orientations=given)
-    result = adjusted(simulation, inputs)
-    assert result.precision is not None
-    error = errors(simulation, result)
-    assert (np.abs(error) < 3.0 * np.sqrt(np.diagonal(result.precision.points, axis1=1, axis2=2))).all()
 
 
 def test_heights_without_which_roll_is_open_stay_and_are_named() -> None:

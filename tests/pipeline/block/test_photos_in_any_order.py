@@ -11,13 +11,9 @@ import pytest
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.pipeline.inputs import AUTO
-from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Gnss, Image, Points, Spec, Terrain
-from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, corners, errors, orientations, positions, simulate, with_control
-from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -150,39 +146,6 @@ def test_neither_the_list_nor_the_table_decides() -> None:
     assert apart(one, other) < ROUNDING
 
 
-@pytest.mark.parametrize("degrees", [(0, 90, 180, 270), (17, 203, 81, 340, 122)])
-def test_photos_are_turned_in_any_way(degrees: tuple[float, ...]) -> None:
-    simulation = block()
-    straight = adjusted(simulation, five_points(simulation))
-    result = adjusted(simulation, turned(in_no_order(five_points(simulation)), degrees))
-    assert "4 strips found" in told(result)
-    assert rms(simulation, result) < 1.05 * rms(simulation, straight)
-
-
-def with_wrong_rays(inputs: Inputs, share: float) -> Inputs:
-    """Move some of the image points by 0.05 to 0.5 mm in x and y."""
-    points, rng = inputs.observations, np.random.default_rng(8)
-    wrong = rng.random(len(points)) < share
-    off = rng.uniform(0.05, 0.5, points.xy.shape) * rng.choice([-1.0, 1.0], points.xy.shape)
-    return replace(inputs, observations=replace(points, xy=np.where(wrong[:, None], points.xy + off, points.xy)))
-
-
-@pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 180, 95)])
-def test_wrong_points_are_found_whatever_way_the_photos_are_turned(degrees: tuple[float, ...]) -> None:
-    """In a strip that is listed: two photos head to tail, with a twentieth of their points wrong."""
-    simulation = block(strips=1, photos=6)
-    result = adjusted(simulation, with_wrong_rays(turned(inputs_of(simulation), degrees), 0.05))
-    assert rms(simulation, result) < 0.1
-
-
-def test_photos_beside_strips_start_together() -> None:
-    simulation = block()
-    inputs = five_points(simulation)
-    result = adjusted(simulation, in_no_order(inputs, ("A", "C")))
-    assert [strip.id for strip in result.inputs.strips] == ["A", "C", "2001-2004", "4001-4004"]
-    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
-
-
 def test_photos_start_from_their_given_orientations() -> None:
     """To three degrees and three metres; no strip is looked for then."""
     simulation = block()
@@ -191,19 +154,6 @@ def test_photos_start_from_their_given_orientations() -> None:
     result = adjusted(simulation, given)
     assert told(result) == "16 photos in no given order start from their given orientations"
     assert document_of(result)["counts"]["strips"] == 0
-    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
-
-
-def test_where_given_orientations_lead_nowhere_strips_start() -> None:
-    simulation = block()
-    inputs = three_corners(simulation)
-    given = rough(simulation, 0.0, 0.0)
-    mixed = np.random.default_rng(7).permutation(len(given.photos))
-    wrong = replace(given, angles=given.angles[mixed] + 1.0, enu=given.enu[mixed])
-    result = adjusted(simulation, replace(in_no_order(inputs), orientations=wrong))
-    assert "4 strips found" in told(result)
-    (other,) = [note.message for note in result.notes if note.code == "start-refused"]
-    assert other.startswith("another start of the photos in no given order led nowhere: ")
     assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
 
 
@@ -258,32 +208,3 @@ def test_a_photo_that_hangs_on_nothing_is_refused_by_name() -> None:
     inputs = with_points_of_their_own(five_points(simulation), ["3003"])
     with pytest.raises(GeometryError, match=r"photo 3003, which is in no strip, .*give its orientation roughly"):
         adjusted(simulation, in_no_order(inputs))
-
-
-def test_what_is_too_much_for_a_start_says_what_to_give() -> None:
-    simulation = block()
-    inputs = with_points_of_their_own(five_points(simulation), ["3001", "3002", "3003", "3004"])
-    with pytest.raises(GeometryError, match=r"strip 3001-3004: .* give their orientations roughly .* COLMAP"):
-        adjusted(simulation, in_no_order(inputs))
-
-
-def test_positions_of_photos_in_no_order_share_one_offset() -> None:
-    simulation = block()
-    inputs = replace(five_points(simulation), positions=positions(simulation, 0.03, shift=1.5, correction="offset"))
-    result = adjusted(simulation, in_no_order(inputs))
-    assert result.bundle is not None
-    names = [name for name in result.bundle.block.problem.common_names() if "offset" in name]
-    assert len(names) == 3
-    assert all("photos in no order" in name for name in nonempty(names))
-    assert rms(simulation, result) < 0.05
-
-
-def test_single_photos_are_no_strips_for_polynomials() -> None:
-    """`auto` that finds no bundle says why, and does not fall over single photos."""
-    simulation = block()
-    given = rough(simulation, 0.0, 0.0)
-    far = replace(given, angles=given.angles + 1.5)
-    inputs = in_no_order(five_points(simulation))
-    listed = replace(inputs, strips=tuple(replace(strip, listed=True) for strip in inputs.strips), orientations=far)
-    with pytest.raises(GeometryError, match=r"determine|converge"):
-        triangulate(listed, replace(settings_of(simulation), adjustment=AUTO))

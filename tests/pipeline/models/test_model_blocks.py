@@ -6,14 +6,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 
-from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
-from photostrip.simulation import Control, Flight, Ground, Models, Points, Simulation, Spec, simulate
+from photostrip.simulation import Control, Flight, Models, Points, Simulation, Spec, simulate
 from tests.loops import nonempty
 from tests.simulated import inputs_of
 
@@ -56,20 +53,6 @@ def test_strips_without_control_are_carried_by_the_others() -> None:
         assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
 
 
-def test_a_free_block_has_the_shape_of_the_truth() -> None:
-    free = Models(sigma_um=FREE, center_sigma_um=FREE, axes="any")
-    spec = Spec(ground=Ground("local", ("east", "north", "up")), flight=Flight(photos=7, strips=2), models=free)
-    simulated = simulate(spec)
-    given = inputs_of(simulated)
-    unknown = replace(given, control=given.control.take(np.zeros(0, np.intp)))
-    result = triangulate(unknown, Settings(adjustment="bundle"))
-    truth = simulated.truth.points.xyz[result.points.number]
-    found = Similarity.from_points(result.points.cartesian, truth)
-    assert np.abs(found(result.points.cartesian) - truth).max() < EXACT
-    assert {note.code for note in result.notes} >= {"free-network"}
-    assert len(sections_of(document_of(result), everything=True)) > 10
-
-
 def test_wrong_rows_and_wrong_control_are_named() -> None:
     """A row 2 mm off in one of three models and more, and a control point 5 m too high: these, and nothing else."""
     given = inputs_of(block(noise=True))
@@ -98,19 +81,3 @@ def test_wrong_rows_and_wrong_control_are_named() -> None:
     out = [row for row in document["rejected"] if row["stage"] == "bundle" and row.get("models")]
     names = {(points.model_ids[points.model[row]], points.point_ids[points.node[row]]) for row in wrong.tolist()}
     assert {(row["models"][0], row["point"]) for row in out if not row["readmitted"]} == names
-
-
-@pytest.mark.slow
-def test_control_left_out_in_turn_finds_its_own_errors() -> None:
-    given = inputs_of(block(noise=True))
-    result = triangulate(given, Settings(cross_validation=True))
-    assert len(result.folds) > 3
-    squares = coordinates = 0.0
-    for fold in nonempty(result.folds):
-        assert fold.result is not None
-        assert fold.result.precision is not None
-        (errors,) = fold.result.precision.checks
-        assert errors is not None
-        assert set(errors.ids) <= set(fold.left_out)
-        squares, coordinates = squares + errors.squares, coordinates + errors.coordinates
-    assert 0.5 < squares / coordinates < 2.0  # 81 coordinates, left out in turn: not independent

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import photostrip
-from tests.flown import Flown, corridor, orbit, project, snake, turn
+from tests.flown import Flown, corridor, orbit, project, snake
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,13 +70,3 @@ def test_an_id_of_two_points_is_named_however_the_cameras_look(ahead: float) -> 
     tables["images.csv"]["point"] = np.where(point == other, one, point).tolist()
     found = photostrip.run(document, tables=tables).document["findings"]
     assert [(each["code"], each["points"]) for each in found] == [("P301", [one])]
-
-
-def test_given_angles_that_are_scattered_are_no_other_unit() -> None:
-    """All angles are small: the smaller a unit makes what scatters, the better it fits."""
-    rng = np.random.default_rng(0)
-    flown = corridor(rng)
-    north = flown.centers[:, [1, 0, 2]] * (-1.0, 1.0, 1.0)
-    level = np.array([turn(rng, 1.5) for _ in north])
-    before, after, _ = told(project(rng, Flown(north, level, flown.strips), rough=8.0))
-    assert before + after == []

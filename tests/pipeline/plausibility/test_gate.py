@@ -12,21 +12,17 @@ import pytest
 
 import photostrip
 from benchmarks import planted
-from photostrip.camera import Distortion
 from photostrip.cli.main import main
-from photostrip.errors import InputError, PhotostripError
+from photostrip.errors import PhotostripError
 from photostrip.formats.output.simulation import project_files
 from photostrip.geometry.rotation import angles
 from photostrip.notes import LOST_SAY
 from photostrip.pipeline.inputs import GivenOrientations, Settings
-from photostrip.pipeline.plausibility import evidence, gate, image_evidence
+from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
 from photostrip.plausibility import KINDS
-from photostrip.plausibility.photos import flight_order
-from photostrip.points import PhotoPoints
 from photostrip.simulation import (
     DIGITAL,
-    FILM,
     Control,
     Film,
     Flight,
@@ -37,7 +33,6 @@ from photostrip.simulation import (
     Terrain,
     simulate,
 )
-from photostrip.strip.image_coordinates.corrections import undistort
 from tests.pipeline.blocks import positions
 from tests.results import write_project
 from tests.simulated import inputs_of, settings_of
@@ -176,12 +171,6 @@ def test_mirrored_images_are_told_apart_from_control_where_the_place_is_known(fl
     assert "or else the image coordinates are mirrored" in finding.message
 
 
-def test_latitude_and_longitude_exchanged() -> None:
-    wrong = with_control(inputs_of(simulation("degrees")), lambda enu: enu[:, [1, 0, 2]])
-    (finding,) = told(wrong)
-    assert finding.code == "P401"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("foot", [FOOT, 1200 / 3937])
 def test_projected_control_in_feet(foot: float) -> None:
@@ -211,14 +200,6 @@ def in_bulgaria(folder: Path, second: str | None = None) -> Path:
     return write_project(folder, spec)
 
 
-def test_zones_are_used_beyond_the_countries_for_which_they_were_registered(tmp_path: Path) -> None:
-    project = in_bulgaria(tmp_path, "EPSG:28405")
-    check, result = photostrip.check(project), photostrip.run(project)
-    assert check.ok
-    assert check.findings == ()
-    assert (result.status, result.document["findings"]) == ("good", [])
-
-
 def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
     project = in_bulgaria(tmp_path)
     text = project.read_text(encoding="utf-8").replace("EPSG:28404", "EPSG:28405")
@@ -231,20 +212,6 @@ def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
     assert result.document["verdict"]["look_at"][0].startswith("P402 control[0] lies about 17.9 E")
 
 
-@pytest.mark.parametrize(("of_images", "of_distance"), [(10.0, 1.0), (1.0, 0.1)])
-def test_points_that_no_lens_sees_without_a_format(of_images: float, of_distance: float) -> None:
-    """They reached to six times the principal distance, and the run was called good."""
-    inputs = inputs_of(simulation("utm"))
-    (strip,) = inputs.strips
-    distance = strip.camera.principal_distance * of_distance
-    camera = replace(strip.camera, principal_distance=distance, format=None)
-    observations = replace(inputs.observations, xy=inputs.observations.xy * of_images)
-    wrong = replace(inputs, strips=(replace(strip, camera=camera),), observations=observations)
-    (finding,) = gate.of_inputs(wrong, Settings())
-    assert finding.code == "P101"
-    assert f"or the principal distance is not {distance:g} mm" in finding.message
-
-
 @pytest.mark.parametrize("factor", [0.1, 0.01, 0.001])
 @pytest.mark.parametrize("frame", ["utm", "south"])
 def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: float) -> None:
@@ -252,12 +219,6 @@ def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: fl
     (finding,) = told(with_control(inputs_of(simulation(frame)), lambda enu: enu * factor))
     assert finding.code == "P402"
     assert finding.evidence["factor"] == pytest.approx(1 / factor)
-
-
-def test_heights_that_count_downwards() -> None:
-    (finding,) = told(with_control(inputs_of(simulation("local")), lambda enu: enu * [1, 1, -1]))
-    assert finding.code == "P401"
-    assert "downwards" in finding.message
 
 
 @pytest.mark.slow
@@ -270,17 +231,6 @@ def test_the_principal_distance_of_another_lens() -> None:
     ]
     assert finding.code == "P105"
     assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=2.0)
-
-
-@pytest.mark.slow
-def test_image_coordinates_ten_times_too_small_without_a_format_are_named_with_the_principal_distance() -> None:
-    inputs = inputs_of(simulation("utm"))
-    strip = inputs.strips[0]
-    unknown = replace(strip, camera=replace(strip.camera, format=None))
-    small = replace(inputs.observations, xy=0.1 * inputs.observations.xy)
-    (finding,) = [each for each in told(replace(inputs, strips=(unknown,), observations=small)) if each.is_error]
-    assert (finding.code, finding.key) == ("P101", "observations.unit")
-    assert "if the principal distance is about 15.3 mm" in finding.message
 
 
 def second_list(inputs: Inputs, change: Callable[[Floats], Floats]) -> tuple[Inputs, tuple[str, ...]]:
@@ -364,41 +314,6 @@ def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role:
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [2100250, 2200192])
-def test_a_slip_that_the_run_could_not_test_is_named(seed: int) -> None:
-    """Kilometres off, the point was called tested; 20 m off in height, the gate took the scatter from few heights."""
-    case = planted.sound(seed)
-    inputs, names = planted_in(case, "slip of a digit, control")
-    result = triangulate(inputs, case.settings)
-    rejected = {name for note in result.notes if note.code == "control-rejected" for name in note.points}
-    assert {name for each in result.findings for name in each.points} | rejected == set(names)
-
-
-@pytest.mark.slow
-def test_a_wrong_image_coordinate_is_no_slip_of_a_digit() -> None:
-    flown = Flight(photos=5, end_lap_percent=64.0)
-    control = Control(bands=3, per_band=3, check=8)
-    inputs = inputs_of(simulate(Spec(flight=flown, terrain=Terrain(relief=100.0), control=control)))
-    o, xy = inputs.observations, inputs.observations.xy.copy()
-    rays = np.flatnonzero(o.point == o.point_ids.index("G03"))
-    assert len(rays) == 2
-    xy[rays[0], 0] += 0.1  # mm, along the base; moves the point by about a metre in plan
-    assert "P406" not in codes(told(replace(inputs, observations=replace(o, xy=xy))))
-    row = inputs.control.ids.index("G03")
-    slipped = with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [0.0, 10.0, 0.0]))
-    assert "P406" in codes(told(slipped))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("step", [2000.0, 30000.0])
-def test_a_height_above_the_cameras_is_a_slip_all_the_same(step: float) -> None:
-    inputs = inputs_of(simulation("utm"))
-    row = int(control_rows(inputs)[1])
-    (finding,) = told(with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [0.0, 0.0, step])))
-    assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
-
-
 @pytest.mark.parametrize(
     ("frame", "written", "role"),
     [("utm", 1e9, "control"), ("utm", 1e17, "check"), ("local", -1e8, "check"), ("local", 1e30, "control")],
@@ -414,17 +329,6 @@ def test_a_height_beyond_the_earth_is_told_without_digits(frame: str, written: f
     assert "would_fit" not in finding.evidence
 
 
-def test_a_check_point_outside_a_projection_is_refused_by_name() -> None:
-    inputs = inputs_of(simulation("utm"))
-    row = int(np.flatnonzero(inputs.control.check)[1])
-    away = with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [1e8, 0.0, 0.0]))
-    with pytest.raises(InputError, match=f"point {inputs.control.ids[row]}: outside the domain"):
-        triangulate(away, Settings(adjustment="polynomial"))
-    assert [(each.code, each.points) for each in triangulate(away, Settings()).findings] == [
-        ("P406", (inputs.control.ids[row],))
-    ]
-
-
 @pytest.mark.slow
 def test_two_control_points_exchanged() -> None:
     inputs = inputs_of(simulation("utm"))
@@ -437,48 +341,6 @@ def test_two_control_points_exchanged() -> None:
     findings = told(with_control(inputs, exchange))
     assert codes(findings) == ["P408"]
     assert set(findings[0].points) == {inputs.control.ids[one], inputs.control.ids[other]}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [8820007, 8820108, 8822007])
-def test_a_slip_beside_exchanged_points(seed: int) -> None:
-    """The first was confirmed by a run that kept all of them, the second's bending was fitted to what is wrong.
-
-    The third let all check points look shifted.
-    """
-    case = planted.sound(seed)
-    _, two = planted_in(case, "two control points exchanged")
-    inputs, three = planted_in(planted.sound(seed), "slip of a digit, two others exchanged")
-    named = {each.code: set(each.points) for each in told(inputs, case.settings)}
-    assert named == {"P406": three - two, "P408": two}
-
-
-def test_exchanged_points_beyond_the_others_are_no_slip_in_check() -> None:
-    """Side by side, photos predict no point beyond the control: what lay there was left out of the search."""
-    case = planted.sound(8821210)
-    inputs, names = planted_in(case, "two control points exchanged")
-    (finding,) = gate.of_inputs(inputs, case.settings)
-    assert (finding.code, set(finding.points)) == ("P408", names)
-
-
-@pytest.mark.slow
-def test_start_angles_in_gons_and_in_another_system() -> None:
-    made = simulation("utm")
-    truth, inputs = made.truth, inputs_of(made)
-    values, nan = angles(truth.rotations_local, "omega-phi-kappa"), np.full((len(truth.photo_ids), 3), np.nan)
-
-    def given(read: Floats) -> Inputs:
-        frame = inputs.frames[0]
-        start = GivenOrientations(
-            truth.photo_ids, frame, truth.centers_ground, read, "omega-phi-kappa", nan, nan, observed=False
-        )
-        return replace(inputs, orientations=start)
-
-    assert told(given(values)) == ()
-    assert codes(told(given(values * 200 / 180))) == ["P601"]
-    (finding,) = told(given(values * [1, 1, -1]))
-    assert finding.code == "P602"
-    assert "kappa of the other sign" in finding.message
 
 
 # ------------------------------------------------------------------------------------------------ several at once
@@ -521,17 +383,6 @@ def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: 
     assert main(["check", str(project), "--format", "json"]) == 2
     checked = {each["code"] for each in json.loads(capsys.readouterr().out)["projects"][0]["findings"]}
     assert {"P101", "P201", "P401", "P406"} <= checked
-
-
-@pytest.mark.slow
-def test_findings_are_told_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    project, _ = four_faults(tmp_path, "utm")
-    assert main(["run", str(project), "--format", "github"]) in {2, 3}
-    lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("::error") and "title=photostrip P101::" in line for line in lines)
-    assert any(line.startswith("::warning") and "title=photostrip P406::" in line for line in lines)
-    assert main(["run", str(project)]) in {2, 3}
-    assert "P201" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -605,34 +456,6 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
 
 
 # ---------------------------------------------------------------------------------- a closer look where it is needed
-
-
-@pytest.mark.parametrize("seed", [26, 68, 112])
-def test_tilts_as_large_as_bases_are_no_wrong_order(seed: int) -> None:
-    lens = Flight(photos=6, end_lap_percent=78.0, attitude_sigma_deg=(3.0, 3.0, 2.0))
-    inputs = inputs_of(simulate(Spec(seed=seed, camera=DIGITAL, flight=lens)))
-    (screen,) = flight_order.find_wrong_order(inputs.observations, "A", inputs.strips[0].photos)[0]
-    assert screen.code == "P201"  # side by side, the photos look exchanged
-    assert gate.of_inputs(inputs, Settings()) == ()
-    photos = [*inputs.strips[0].photos]
-    photos[3], photos[1] = photos[1], photos[3]
-    wrong = replace(inputs, strips=(replace(inputs.strips[0], photos=tuple(photos)),))
-    assert codes(gate.of_inputs(wrong, Settings())) == ["P201"]
-
-
-@pytest.mark.parametrize("end_lap", [60.0, 80.0])
-def test_where_a_point_lies_along_a_strip_does_not_depend_on_the_end_lap(end_lap: float) -> None:
-    made = simulate(Spec(seed=4, flight=Flight(photos=6, end_lap_percent=end_lap, attitude_sigma_deg=(2.0, 2.0, 2.0))))
-    inputs = inputs_of(made)
-    images = image_evidence.of_images(inputs, Settings())
-    rows, place = evidence.places_along_strip(inputs.strips[0], images.observations, inputs.control, images.steps)
-    index = {name: row for row, name in enumerate(made.truth.points.ids)}
-    xyz = made.truth.points.xyz[[index[inputs.control.ids[row]] for row in rows]]
-    first, last = made.truth.centers[0], made.truth.centers[-1]
-    true = 5.0 * (xyz - first) @ (last - first) / ((last - first) ** 2).sum()
-    assert np.abs(place - true).max() < 0.5  # base; the mean number of its photos is off by 1.0 at the ends at 80 %
-    assert place.min() < 0.3
-    assert place.max() > 4.7
 
 
 def test_ids_are_examined_before_a_run() -> None:
@@ -718,28 +541,6 @@ def test_angles_of_a_bundle_in_another_unit_or_sense(observed: bool, read: list[
     assert codes(findings) == ([] if code is None else [code])
 
 
-def test_evidence_is_free_of_distortion_though_a_photo_stands_twice_in_the_list() -> None:
-    lens = replace(FILM, distortion=Distortion("brown", "image_to_ideal", (1e-8, 0.0, 0.0)))
-    inputs = inputs_of(simulate(replace(strip(), camera=lens)))
-    o, (line,) = inputs.observations, inputs.strips
-    rows = o.photo == o.photo_ids.index(line.photos[2])
-    twin = PhotoPoints(
-        (*o.photo_ids, "twin"),
-        o.point_ids,
-        np.r_[o.photo, np.full(rows.sum(), len(o.photo_ids))],
-        np.r_[o.point, o.point[rows]],
-        np.r_[o.xy, o.xy[rows]],
-        np.r_[o.sigma, o.sigma[rows]],
-    )
-    listed = replace(line, photos=(*line.photos[:3], "twin", *line.photos[3:]))
-    wrong = replace(inputs, strips=(listed,), observations=twin)
-    images = image_evidence.of_images(wrong, Settings())
-    assert images.strips[0].photos == line.photos  # the twin has no place of its own, but a camera
-    ideal = evidence.ideal(images.observations, images.cameras, Settings())
-    assert ideal.xy == pytest.approx(undistort(twin.xy, lens), abs=1e-12)
-    assert codes(told(wrong)) == ["P203"]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed"),
@@ -787,50 +588,6 @@ def test_a_reduced_photo_is_named_with_its_scale() -> None:
     assert finding.evidence["scale"] == pytest.approx(1.0 / 1.5, abs=0.01)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "seed"),
-    [
-        ("principal distance off by 1 to 3 %", 7310013),  # a shift of one photo explains some of it
-        ("image coordinates in another unit", 7310003),
-    ],
-)
-def test_what_else_is_wrong_with_photos_is_no_shift(name: str, seed: int) -> None:
-    case = planted.sound(seed)
-    inputs, _ = planted_in(case, name)
-    assert "P109" not in codes(told(inputs, case.settings))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "seed", "code", "other"),
-    [
-        ("ten principal distances, no format", 7500239, "P101", "P409"),
-        ("given points with coordinates of others", 7630004, "P409", "P105"),
-    ],
-)
-def test_a_strip_that_a_wrong_distance_tears_apart_is_not_taken_for_control_of_other_points(
-    name: str, seed: int, code: str, other: str
-) -> None:
-    """Its bases came out 0.2 to 7 times as long as their neighbours; heights of other points fit no distance."""
-    case = planted.sound(seed)
-    inputs, _ = planted_in(case, name)
-    named = codes(told(inputs, case.settings))
-    assert code in named
-    assert other not in named
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [8810017, 8810070])
-def test_slips_that_turn_a_strip_of_models_over_are_named(seed: int) -> None:
-    """In the last third of 15 models; in a local system, where another order of columns fits by chance."""
-    case = planted.of_models(seed)
-    inputs, ids = planted_in(case, "slip of a digit, models")
-    (finding,) = triangulate(inputs, case.settings).findings
-    assert (finding.code, frozenset(finding.points)) == ("P406", ids)
-    assert "typing error" in finding.message
-
-
 @pytest.mark.parametrize(("wrong", "least"), [(1, 3), (2, 4)])
 def test_one_wrong_point_of_three_is_no_other_control_but_two_of_four_are(wrong: int, least: int) -> None:
     inputs = inputs_of(simulation())
@@ -844,24 +601,6 @@ def test_one_wrong_point_of_three_is_no_other_control_but_two_of_four_are(wrong:
 
 def test_every_kind_of_mistake_is_planted_in_the_benchmark() -> None:
     assert {code for mistake in planted.MISTAKES for code in mistake.codes} - set(LOST_SAY) == set(KINDS)
-
-
-def test_an_id_beside_another_with_its_coordinates_is_no_copied_row_where_they_are_one_point() -> None:
-    case = next(case for case in map(planted.sound, range(43001, 43020)) if planted.row_copied(case))
-    o, control = case.inputs.observations, case.inputs.control
-    seen = case.full()
-    one, other = (int(each) for each in seen[:2])
-    rows = o.point == o.point_ids.index(control.ids[one])
-    names = (*o.point_ids, "twin")
-    twin = replace(
-        o, point_ids=names, photo=np.r_[o.photo, o.photo[rows]], xy=np.r_[o.xy, o.xy[rows]],
-        point=np.r_[o.point, np.full(rows.sum(), len(names) - 1)], sigma=np.r_[o.sigma, o.sigma[rows]],
-    )  # fmt: skip
-    ids = tuple("twin" if row == other else name for row, name in enumerate(control.ids))
-    enu = control.enu.copy()
-    enu[other] = enu[one]
-    inputs = replace(case.inputs, observations=twin, control=replace(control, ids=ids, enu=enu))
-    assert "P410" not in codes(gate.of_inputs(inputs, case.settings))
 
 
 def test_a_bundle_that_fails_is_explained_by_strips_adjusted_each_by_itself() -> None:

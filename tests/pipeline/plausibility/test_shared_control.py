@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Spec
 from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Gnss
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -61,26 +59,6 @@ def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, floa
     given = np.isfinite(screened.problem.control.sigma).sum(axis=1)
     assert set(given[screened.problem.control.frame == 1].tolist()) == {3 - axes}
     assert set(given[screened.problem.control.frame == 0].tolist()) == {3}
-
-
-@pytest.mark.slow
-def test_camera_positions_say_which_list_is_wrong() -> None:
-    """The longer one: the shorter went before."""
-    simulation = simulate(Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4), gnss=Gnss()))
-    inputs = inputs_of(simulation)
-    control = inputs.control
-    wrong = np.arange(len(control)) % 3 > 0
-    control = replace(control, frame=wrong.astype(np.intp), enu=control.enu + np.outer(wrong, (2.0, 1.0, 0.0)))
-    photos, enu = simulation.truth.photo_ids, simulation.gnss
-    assert enu is not None
-    positions = CameraPositions(
-        photos, inputs.frames[0], enu, np.ones(enu.shape, bool), np.full(enu.shape, 0.15), np.full(len(enu), np.nan)
-    )
-    inputs = replace(inputs, control=control, frames=(inputs.frames[0],) * 2, positions=positions)
-    result = triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
-    (finding,) = result.findings
-    assert (finding.code, finding.key) == ("P407", "control[1]")
-    assert not finding.message.endswith("cannot be told")
 
 
 def with_moved_checks(shift: Sequence[float], count: int, adjustment: str) -> Result:

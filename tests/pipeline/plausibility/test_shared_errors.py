@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from benchmarks import planted
 from photostrip.pipeline.inputs import CameraPositions
-from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, GrossError, Spec, Terrain
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Gnss
-from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -127,35 +124,6 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
     assert rms(simulation, result) < 0.4
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("seed", "rejected"), [(8810027, 15), (8930004, 30)])
-def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: int) -> None:
-    """Its unknown did not converge, and up to 173 image points were rejected in its place."""
-    case = planted.block(seed)
-    inputs, strips = planted.distance_of_one_strip(case)
-    result = triangulate(inputs, replace(case.settings, adjustment="bundle"))
-    (finding,) = result.findings
-    assert (finding.code, set(finding.strips)) == ("P105", strips)
-    assert result.bundle is not None
-    rejections = result.bundle.screened.rejections
-    assert len(rejections) <= rejected
-    assert [each for each in rejections if not each.readmitted] == []
-    given = case.inputs.strips[0].camera.principal_distance
-    assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.02)
-
-
-@pytest.mark.parametrize("seed", [8810170, 8810441])
-def test_doubted_control_may_be_a_principal_distance_off_by_percents(seed: int) -> None:
-    """Photos that are tilted bend the strip by more than its stretch: one control point was doubted, and used."""
-    case = planted.sound(seed)
-    wrong = planted.mistake("principal distance off by 1 to 3 %").plant(case)
-    assert wrong is not None
-    (finding,) = triangulate(wrong[0], case.settings).findings
-    given = case.inputs.strips[0].camera.principal_distance
-    assert finding.code == "P107"
-    assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.006)
-
-
 def test_single_wrong_positions_stay_single() -> None:
     """Two positions that are off take no offset of all with them."""
     shift = np.zeros((20, 3))
@@ -198,22 +166,6 @@ def test_the_strip_method_names_a_principal_distance_off_by_a_percent(share: flo
     assert result.strips[0].wrong_control == ()
 
 
-@pytest.mark.slow
-def test_wrong_control_points_are_no_principal_distance() -> None:
-    """Two coordinates that are off stay two coordinates."""
-    result = on_hills(0.0, GrossError("control", count=2, size_m=3.0))
-    assert {each.code for each in result.findings} <= {"P406"}
-    assert len(result.strips[0].wrong_control) == 2
-
-
-@pytest.mark.slow
-def test_control_that_contradicts_the_positions_is_told_with_them() -> None:
-    """Control off by 50 m everywhere: a drift of the positions is taken up, and the control rejected all the same."""
-    _, result = adjusted(strips=1, control=Control(bands=3, noise=(50.0, 50.0, 50.0)))
-    told = [each.message for each in result.findings if each.code == "P208"]
-    assert all("which of the two is right cannot be told" in each for each in nonempty(told))
-
-
 @pytest.mark.parametrize(
     ("rows", "order"),
     [
@@ -234,95 +186,6 @@ def test_positions_of_other_photos_are_named_and_put_right(rows: slice | np.ndar
     assert finding.photos == tuple(simulation.truth.photo_ids[row] for row in moved)
     assert [kind for kind in lost(result) if kind == "control"] == []
     assert rms(simulation, result) < 1.2 * rms(*adjusted(strips=1))
-
-
-def of_planted(name: str, seed: int) -> Result:
-    """Adjust a project of the benchmark with a mistake."""
-    mistake = planted.mistake(name)
-    case = mistake.make(seed)
-    wrong = mistake.plant(case)
-    assert wrong is not None
-    return triangulate(wrong[0], mistake.settings(case))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [300001, 320001])
-def test_positions_in_reversed_order_are_told_where_nothing_converges_with_them(seed: int) -> None:
-    """With plan or height points an adjustment goes before the search, which it must not bend."""
-    result = of_planted("camera positions in reversed order", seed)
-    assert [(each.code, each.evidence.get("order")) for each in result.findings] == [("P208", "reversed")]
-    assert lost(result) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "seed", "code"), [("crs of another country", 300006, "P402"), ("all heights zero", 300000, "P410")]
-)
-def test_what_is_given_elsewhere_is_told_and_no_camera(name: str, seed: int, code: str) -> None:
-    """A map stretches plan outside its area, and heights that are none would fit another principal distance."""
-    assert [each.code for each in of_planted(name, seed).findings] == [code]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "seed"),
-    [
-        ("principal distance of another lens", 100003),
-        ("principal distance of another lens", 100011),
-        ("pixels of an image of another width", 330002),
-    ],
-)
-def test_a_lens_far_off_is_told_and_no_control_goes(name: str, seed: int) -> None:
-    """Steps that begin in a network which half the principal distance has bent do not come to an end."""
-    result = of_planted(name, seed)
-    assert [each.code for each in result.findings if each.severity in {"error", "warning"}] == ["P105"]
-    assert not lost(result)
-
-
-def test_what_photos_share_is_told_where_no_single_test_is_beyond_its_limit() -> None:
-    """A principal point 0.2 mm off hardly moves sigma0, and no residual; all of them together are sure of it."""
-    result = of_planted("principal point off by 0.05 to 0.3 mm", 310002)
-    assert result.bundle is not None
-    assert [each.code for each in result.findings] == ["P111"]
-    assert not lost(result)
-
-
-@pytest.mark.parametrize(("name", "code"), [("all heights zero", "P410"), ("heights counted downwards", "P401")])
-def test_control_of_which_half_would_go_stays(name: str, code: str) -> None:
-    """Single tests leave what goes with some wrong heights, and sound plan coordinates go for them."""
-    result = of_planted(name, 310003)
-    assert [each.code for each in result.findings] == [code]
-    assert not lost(result)
-    assert {note.code for note in result.notes} >= {"control-doubtful"}
-
-
-def test_doubted_control_counts_how_many_coordinates_it_may_be() -> None:
-    """Heights of two kinds are one cause; the strips leave two of them out, any two of all that are given."""
-    result = of_planted("heights of two kinds in one list", 310032)
-    assert [each.code for each in result.findings] == ["P404"]
-    assert not lost(result)
-
-
-@pytest.mark.parametrize("scatter", [0.0, 0.05])
-def test_heights_of_level_ground_are_no_mistake(scatter: float) -> None:
-    """They are one number, or nearly so; one of them is taken out for a wrong image of its point."""
-    made = simulate(Spec(seed=5, flight=Flight(photos=10), control=Control(every=3), terrain=Terrain(relief=0.0)))
-    inputs, o = inputs_of(made), inputs_of(made).observations
-    enu = inputs.control.enu.copy()
-    enu[:, 2] = np.median(enu[:, 2]) + np.random.default_rng(1).normal(0.0, scatter, len(enu))
-    xy = o.xy.copy()
-    xy[np.flatnonzero(o.point == o.point_ids.index("G02"))[0], 0] += 0.5
-    wrong = replace(inputs, control=replace(inputs.control, enu=enu), observations=replace(o, xy=xy))
-    assert {each.code for each in gate.of_inputs(wrong, settings_of(made))} <= {"P406"}
-
-
-def test_positions_that_are_off_by_a_base_are_those_of_other_photos_only_where_the_bases_say_so() -> None:
-    """An offset along the flight leaves the bases as they are."""
-    simulation = simulate(Spec(seed=7, flight=Flight(photos=10), control=Control(bands=2), gnss=Gnss()))
-    assert simulation.gnss is not None
-    _, result = adjusted(strips=1, shift=np.diff(simulation.gnss, axis=0).mean(axis=0))
-    (finding,) = result.findings
-    assert finding.key == "camera_positions.correction"
 
 
 @pytest.mark.parametrize("adjustment", ["auto", "polynomial"])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline.run import triangulate
-from photostrip.plausibility.photos.tied_strips import TiesOfStrips, find_shared_ids_of_strips
 from photostrip.simulation import Control, Flight, GrossError, Points, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
@@ -69,41 +68,6 @@ def test_ids_that_two_strips_share_by_mistake_are_named(method: str, apart: floa
         assert least < far * by / apart < 1.2
         by_strip = [set(each.photos) & set(strip.photos) for strip in inputs.strips]
         assert each.strips == ("A", "B") if of_polynomial else all(by_strip)
-
-
-@pytest.mark.parametrize(("off", "named"), [(10.0, 0), (500.0, 1)])
-def test_a_single_common_point_is_judged_by_the_flying_height(off: float, named: int) -> None:
-    ties = TiesOfStrips(
-        points=np.array([7]),
-        names=("P7",),
-        plan=np.zeros((1, 2)),
-        difference=np.array([[0.0, off]]),
-        rays=np.array([2]),
-        sigma=0.1,
-        depth=1000.0,
-        strips=("A", "C"),
-    )
-    assert [each.points for each in find_shared_ids_of_strips(ties)] == [("P7",)] * named
-
-
-@pytest.mark.parametrize(
-    ("rays", "off", "code"), [(3, 1.5, None), (3, 3.0, "P301"), (2, 1.5, None), (2, 8.0, "P304"), (2, 15.0, "P301")]
-)
-def test_a_tie_of_two_rays_may_be_a_wrong_measurement(rays: int, off: float, code: str | None) -> None:
-    """Of a thousand good ties one is far off; an image coordinate along the base moves a point of two rays."""
-    difference = np.zeros((20, 2))
-    difference[4] = off, 0.0
-    ties = TiesOfStrips(
-        points=np.arange(20),
-        names=tuple(f"P{number}" for number in range(20)),
-        plan=np.column_stack([np.arange(20.0) * 100.0, np.arange(20.0) % 3 * 50.0]),
-        difference=difference,
-        rays=np.full(20, rays),
-        sigma=0.1,
-        depth=1000.0,
-        strips=("A", "B"),
-    )
-    assert [(each.code, each.points) for each in find_shared_ids_of_strips(ties)] == [(code, ("P4",))] * bool(code)
 
 
 @pytest.mark.slow

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.pipeline import precision
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.precision import photo_precision
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
-from photostrip.strip.polynomial import correction
+from photostrip.strip import polynomial
 from tests.derivatives import UNSCREENED, oriented_of
 from tests.simulated import inputs_of
 
@@ -52,12 +52,12 @@ def by_strip(inputs: Inputs, wanted: Settings) -> list[Floats]:
 def test_common_control_makes_common_errors() -> None:
     """Mean of two strips: a quarter of both covariances, and twice what their shared control does to both."""
     inputs = two_strips()
-    wanted = Settings(adjustment="polynomial", relative=UNSCREENED, polynomial=correction.PolynomialSettings("1"))
+    wanted = Settings(adjustment="polynomial", relative=UNSCREENED, polynomial=polynomial.PolynomialSettings("1"))
     result = triangulate(inputs, wanted)
     observations, assured = result.refined.observations, result.precision
     assert assured is not None
     each = [
-        photo_precision.of_photos(strip, oriented_of(result, number), observations, inputs.control, of_checks=False)
+        precision.of_photos(strip, oriented_of(result, number), observations, inputs.control, of_checks=False)
         for number, strip in enumerate(result.strips)
     ]
     names = [set(strip.control.ids) for strip in result.strips]

@@ -9,25 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import (
+from photostrip.planning.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,
     assumed_constants,
-    base_frame_elements,
-    determines_paraboloid,
     fit_paraboloid,
     paraboloid_rows,
     parallax_error,
     rigorous_covariance,
     surface_of_elements,
 )
-from photostrip.planning.model.plan import source_example
-from photostrip.strip.relative_orientation import six_points
 from tests.draws import orthogonal_normal
-from tests.planning.formulas import ground_errors, orientation_factors, relative_differentials
+from tests.planning.formulas import ground_errors, orientation_factors
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -72,19 +67,6 @@ def test_the_printed_22_micrometres_are_21() -> None:
     # 10 um, f = b, a central point: the text of the source says 22
     assert PRINTED[CENTRAL].plan * 10 == pytest.approx(21)
     assert assumed_constants()[CENTRAL].plan * 10 == pytest.approx(21.2, abs=0.05)
-
-
-def test_the_worked_example_beside_what_six_points_give() -> None:
-    rows = {(row.place, row.quantity): row for row in source_example()}
-    assert [row.printed for row in rows.values()] == [35, 23, 22, 16]
-    assert [row.formula for row in rows.values()] == pytest.approx([35, 23, 21, 16])
-    assert [row.assumed for row in rows.values()] == pytest.approx([35.4, 22.9, 21.2, 15.8], abs=0.06)
-    # var(c) from the orientation: 1/2 + 3/4 + 2/3 left, 1/2 + 2/3 right, 1/2 in the middle; an x parallax counts 1
-    side, middle = rows[SIDE, "height"], rows[CENTRAL, "height"]
-    assert (side.left, side.right) == pytest.approx((10 * np.sqrt(35 / 12), 10 * np.sqrt(13 / 6)))
-    assert (middle.left, middle.right) == pytest.approx((10 * np.sqrt(1.5),) * 2)
-    assert side.assumed > 1.3 * side.left
-    assert rows[SIDE, "plan"].assumed > 1.8 * rows[SIDE, "plan"].left
 
 
 F, A, B, SIGMA = 153.0, 92.0, 92.0, 0.005
@@ -143,12 +125,6 @@ def test_the_rigorous_formulas_are_the_scatter_of_exact_models() -> None:
     assert 10 * expected[0, 2] == pytest.approx(0.2008, abs=1e-4)
 
 
-def test_elements_of_the_base_frame_and_of_the_dependent_pair() -> None:
-    elements = np.array([2e-5, -3e-5, -4e-5, 6e-5, 5e-5])
-    dependent = six_points.dependent_from_base(B) @ elements
-    assert base_frame_elements(dependent, B) == pytest.approx(elements)
-
-
 def heights(xy: Floats, elements: Floats, focal: float, base: float) -> Floats:
     """Heights of an exact pair at photo scale whose photos have turned by small elements against the base."""
     al1, ka1, al2, om2, ka2 = elements
@@ -196,66 +172,10 @@ def test_factors_of_the_orientation_are_the_scatter_of_exact_orientations() -> N
     assert c.var(axis=1) == pytest.approx(expected, rel=0.04)
 
 
-def test_relative_differentials_are_those_of_the_normal_case() -> None:
-    base, p, x, y, f = 500.0, 70.0, 40.0, -25.0, 100.0
-
-    def point(base: float, p: float, x: float, y: float, f: float) -> Floats:
-        return base / p * np.array([x, y, f])
-
-    d = 1e-6
-    step = point(base + d, p + 2 * d, x + 3 * d, y - d, f + d) - point(base, p, x, y, f)
-    found = relative_differentials(d / base, 2 * d / p, (x, y), (3 * d, -d, d), f)
-    assert found == pytest.approx(step / point(base, p, x, y, f), rel=1e-5)
-
-
 # ---------------------------------------------------------------------------------------------------- estimation
 
 
 FIVE = np.array([[0.0, 65.0], [70.0, 65.0], [0.0, -65.0], [70.0, -65.0], [35.0, 0.0]])
-
-
-def test_five_points_give_the_elements_back() -> None:
-    elements = np.array([2e-5, -3e-5, -4e-5, 6e-5, 5e-5])
-    m, f, b = 10_000.0, 100.0, 70.0
-    surface = surface_of_elements(elements, m, f, b)
-    fitted = fit_paraboloid(FIVE, paraboloid_rows(FIVE) @ surface, 1.0)
-    assert fitted.coefficients == pytest.approx(surface, rel=1e-9)
-    assert fitted.redundancy == 0
-    assert np.isnan(fitted.sigma0)
-    omega, alpha = fitted.elements(m, b)
-    assert (omega, alpha) == pytest.approx((6e-5, -6e-5))
-    assert fitted.critical() == pytest.approx(1.96, abs=0.001)
-
-
-def test_few_redundant_points_do_not_overrule_the_stated_precision() -> None:
-    seven = np.vstack([SIX, FIVE[4:]])
-    one_left = np.array([1.0, -1.0, -0.5, 0.5, -0.5, 0.5, 0.0])  # what six points leave
-    lucky = fit_paraboloid(seven, 1e-6 * one_left, 0.1)
-    assert lucky.redundancy == 2
-    assert lucky.sigma0 < 1e-4
-    assert np.all(lucky.sigmas[3:] > 1e-6)
-    assert lucky.critical() == pytest.approx(1.96, abs=0.001)
-    assert np.abs(lucky.t_values).max() < 1e-3
-
-
-@pytest.mark.parametrize(
-    ("xy", "enough"),
-    [
-        (SIX, False),  # x² = b x
-        (FIVE, True),
-        (FIVE[:4], False),
-        (np.vstack([SIX, [[0.2, 0.0]]]), False),  # hardly another distance
-        (np.vstack([SIX, [[30.0, 0.0]]]), True),
-        (np.array([[x, 2.0] for x in range(6)]), False),
-        (np.array([[3.0, y] for y in range(6)]), False),
-    ],
-)
-def test_which_points_determine_the_surface(xy: Floats, *, enough: bool) -> None:
-    assert determines_paraboloid(xy) is enough
-    assert determines_paraboloid(xy * 250 + 4000) is enough  # whatever the unit and the origin
-    if not enough:
-        with pytest.raises(GeometryError, match="do not determine twist and bending"):
-            fit_paraboloid(xy, np.zeros(len(xy)), 1.0)
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.planning.model.closed_form import ORDER, coefficients, control_sums, kernels
-from photostrip.planning.model.single_model import ELEMENTS, ModelControl, influence, orientation_operator
+from photostrip.planning.closed_form import ORDER, coefficients, control_sums, kernels
+from photostrip.planning.single_model import ELEMENTS, ModelControl, influence, orientation_operator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -121,72 +121,3 @@ def test_what_the_command_calls_printed_has_every_misprint_and_no_other() -> Non
     assert printed.across_along[0] == pytest.approx((y * Y - x * X) / B)
     assert printed.up[0] == pytest.approx(1 / n + (-x * (c2 * X + c3 * Y) - y * (c3 * X - c1 * Y)) / A)
     assert printed.along_along[0] == pytest.approx(right.along_along[0])
-
-
-def test_the_printed_symbols_of_eq_9_and_10_cannot_be_meant() -> None:
-    # "d Delta x" stands three times: over b, then twice over bZ; only kappa over b and alpha over bZ are left to name
-    rows = direct()[:2]
-    kappa, alpha = ORDER.index("dkappa"), ORDER.index("dalpha")
-    exchanged = rows.copy()
-    exchanged[:, [kappa, alpha]] = rows[:, [alpha, kappa]]
-    assert np.abs(exchanged - as_printed()).max() > 1.0
-
-
-def test_the_printed_kernels_of_the_control_in_eq_10_do_not_give_back_a_known_orientation() -> None:
-    given = control().points
-    X, Y = (XY - XY.mean(axis=0)).T
-    B = (X**2 + Y**2).sum()
-    x, y = POINT - XY.mean(axis=0)
-    shift, scale, turn = (0.3, -0.2), 1e-3, 2e-3
-    wx, wy = shift[0] + X * scale - Y * turn, shift[1] + Y * scale + X * turn
-    wanted = shift[1] + y * scale + x * turn
-    n = len(XY)
-    printed = ((1 / n + (y * X + x * Y) / B) * wy).sum() + ((y * Y - x * X) / B * wx).sum()
-    correct = ((1 / n + (y * Y + x * X) / B) * wy).sum() + ((y * X - x * Y) / B * wx).sum()
-    assert correct == pytest.approx(wanted)
-    assert abs(printed - wanted) > 0.01
-    operator = orientation_operator([[*POINT, DEPTH]], control())
-    assert operator[0, 1, :, 0] @ wx + operator[0, 1, :, 1] @ wy == pytest.approx(wanted)
-    assert len(given) == n
-
-
-def test_the_printed_height_kernel_of_eq_11_does_not_give_back_a_known_tilt() -> None:
-    X, Y = (XY - XY.mean(axis=0)).T
-    c1, c2, c3 = control_sums(XY)[:3]
-    x, y = POINT - XY.mean(axis=0)
-    misclosure = 0.5 + 1e-3 * X - 2e-3 * Y
-    wanted = 0.5 + 1e-3 * x - 2e-3 * y
-    A, n = c1 * c2 - c3**2, len(XY)
-    printed = ((1 / n + (-x * (c2 * X + c3 * Y) - y * (c3 * X - c1 * Y)) / A) * misclosure).sum()
-    correct = ((1 / n + (x * (c2 * X - c3 * Y) - y * (c3 * X - c1 * Y)) / A) * misclosure).sum()
-    assert correct == pytest.approx(wanted)
-    assert abs(printed - wanted) > 0.005
-
-
-def test_eq_11_needs_the_measurement_of_each_control_point_in_the_sum() -> None:
-    # printed: dz of the point itself inside the sum over the control; then a common height error of the control stays
-    operator = orientation_operator([[*POINT, DEPTH]], control())[0, 2, :, 2]
-    at_point, at_control = 0.004, np.full(len(XY), 0.003)
-    correct = at_point - operator @ at_control
-    printed = at_point - operator @ np.full(len(XY), at_point)
-    assert correct == pytest.approx(0.001)  # the common part of the control's error has gone into the point
-    assert printed == pytest.approx(0.0)  # as if the point were free of error
-
-
-def test_x_y_z_of_eq_6_are_not_the_centred_ones_of_eq_5() -> None:
-    # W = dx1 + dx2 - dX_geo: a model without any errors has no misclosures
-    centred = XY - XY.mean(axis=0)
-    errors = np.zeros((len(XY), 3))
-    as_eq_5_names_them = errors.copy()
-    as_eq_5_names_them[:, :2] -= centred
-    operator = orientation_operator([[*POINT, DEPTH]], control())
-    assert np.einsum("qanb,nb->qa", operator, errors) == pytest.approx(np.zeros((1, 3)))
-    assert np.abs(np.einsum("qanb,nb->qa", operator, as_eq_5_names_them)).max() > 10  # mm
-
-
-def test_dv0_is_dy0() -> None:
-    # eq. 4: the mean of the misclosures in y moves y, and no parameter is called V
-    misclosure = np.zeros((len(XY), 3))
-    misclosure[:, 1] = 0.7
-    moved = np.einsum("qanb,nb->qa", orientation_operator([[*POINT, DEPTH]], control()), misclosure)
-    assert moved[0] == pytest.approx([0.0, 0.7, 0.0])

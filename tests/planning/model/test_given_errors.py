@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.errors import InputError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model.deformation import paraboloid_rows
-from photostrip.planning.model.plan import ControlPoint, ModelSpec, NamedPoint, both_forms, given_errors, plan_model
+from photostrip.planning.model_plan import ControlPoint, ModelSpec, NamedPoint, given_errors, plan_model
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import intersected
 
@@ -29,7 +27,6 @@ CONTROL = (
     ControlPoint((91.0, -75.0), "4", height=90.0),
     ControlPoint((40.0, 5.0), "5", use="z", measured_error=(0.0, 0.0, -0.06)),
 )
-LEVEL = tuple(ControlPoint(point.at, point.name) for point in CONTROL)
 POINTS = (
     NamedPoint((20.0, 30.0), "A", height=120.0, measured_error=(0.01, 0.02, -0.04)),
     NamedPoint((70.0, -60.0), "B"),
@@ -88,48 +85,6 @@ def test_given_errors_are_those_of_the_exact_model_and_its_fit() -> None:
     assert causes == pytest.approx(found.parts.total, abs=1e-12)
 
 
-def test_misclosures_give_the_same_orientation_as_the_errors_that_make_them() -> None:
-    made = given_errors(SPEC)
-    assert made is not None
-    assert made.parts is not None
-    model = errors_of_the_exact_model(CONTROL)
-    misclosures = model - np.array([point.given_error for point in CONTROL])
-    control = tuple(
-        ControlPoint(point.at, point.name, height=point.height, use=point.use, misclosure=tuple(each))
-        for point, each in zip(CONTROL, misclosures.tolist(), strict=True)
-    )
-    found = given_errors(ModelSpec(F, base=B, width=A, scale=SCALE, control=control, points=POINTS))
-    assert found is not None
-    assert found.parts is None
-    assert found.bent is None
-    assert found.correction.plain * UNIT == pytest.approx(made.parts.absolute * UNIT, abs=2e-4)
-    assert found.correction.parameters == pytest.approx(made.correction.parameters, abs=1e-6)
-
-
-def test_without_errors_nothing_is_said() -> None:
-    assert given_errors(ModelSpec(F, base=B, width=A, control=LEVEL)) is None
-
-
-def test_the_bent_model_is_the_exact_one_less_its_datum() -> None:
-    found = given_errors(SPEC)
-    assert found is not None
-    assert found.bent is not None
-    places = plan_model(SPEC).places
-    assert found.bent.raised[:, 2] == pytest.approx(paraboloid_rows(places) @ found.bent.surface, abs=1e-12)
-    # shift, tilts, azimuth and scale taken out of both: what is left is the same
-    level = np.column_stack([places, np.full(len(places), F)])
-    exact = intersected(level, B, np.array(ELEMENTS), F) - level * (1, 1, -1)
-    tilted = np.column_stack([np.ones(len(places)), places])
-
-    def bent(heights: Floats) -> Floats:
-        left: Floats = heights - tilted @ np.linalg.lstsq(tilted, heights, rcond=None)[0]
-        return left
-
-    assert bent(found.bent.raised[:, 2]) == pytest.approx(bent(exact[:, 2]), abs=3e-6)
-    assert bent(found.bent.left[:, 2]) == pytest.approx(bent(exact[:, 2]), abs=3e-6)
-    assert np.abs(bent(exact[:, 2])).max() > 1e-3
-
-
 def similarity_left(model: Floats, given: Floats, every: Floats) -> Floats:
     """Transform points by the similarity in space that fits a model to its control with equal weights."""
     a, b = model - model.mean(axis=0), given - given.mean(axis=0)
@@ -170,14 +125,3 @@ def test_points_with_relief_scatter_as_expected_after_a_similarity_in_space() ->
     ratio = np.std(errors, axis=0) / forecast.at_points
     assert ratio == pytest.approx(np.ones_like(ratio), abs=0.07)
     assert ratio.mean() == pytest.approx(1.0, abs=0.02)
-
-
-def test_both_forms_at_named_points_and_where_they_do_not_hold() -> None:
-    points = (NamedPoint((20.0, 30.0), "A"),)
-    forms = both_forms(ModelSpec(F, base=B, width=A, control=LEVEL, points=points))
-    assert forms.closed == pytest.approx(forms.operators, rel=1e-9, abs=1e-9)
-    assert np.abs(forms.printed - forms.closed).max() > 1
-    with pytest.raises(InputError, match="in full"):
-        both_forms(ModelSpec(F, base=B, width=A, control=CONTROL, points=points))
-    with pytest.raises(InputError, match="level ground, and 1, 2, 3, 4 lie"):
-        both_forms(ModelSpec(F, base=B, width=A, control=CONTROL[:4]))

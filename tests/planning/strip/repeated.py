@@ -9,14 +9,23 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
-from photostrip.network.solve import solve
+from photostrip.network.adjustment import solve
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
-from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.method import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
-from photostrip.planning.strip.ideal_strip import ControlLayout, StripGeometry, ideal_strip, numbers_of, spots_of
-from photostrip.planning.strip.methods import BUNDLE, DEGREES, bundle_problem, control_of
+from photostrip.planning.ideal_strip import (
+    BUNDLE,
+    DEGREES,
+    ControlLayout,
+    StripGeometry,
+    bundle_problem,
+    control_of,
+    ideal_strip,
+    numbers_of,
+    spots_of,
+)
 from photostrip.points import ControlPoints
-from photostrip.strip.polynomial import correction
+from photostrip.strip import polynomial
 from photostrip.strip.relative_orientation.orientation import RelativeSettings
 
 if TYPE_CHECKING:
@@ -24,7 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.planning.strip.ideal_strip import IdealStrip, Spot
+    from photostrip.planning.ideal_strip import IdealStrip, Spot
 
     Floats = NDArray[np.float64]
 
@@ -77,7 +86,7 @@ def run_settings(method: str) -> Settings:
     """Give settings of a run by one of the methods, without a search for gross errors."""
     return Settings(
         relative=RelativeSettings(screening="none"),
-        polynomial=correction.PolynomialSettings(DEGREES.get(method, "auto")),
+        polynomial=polynomial.PolynomialSettings(DEGREES.get(method, "auto")),
         adjustment="polynomial" if method in DEGREES else method,
         precision=False,  # it is what the plan says that is compared with the scatter
     )

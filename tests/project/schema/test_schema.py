@@ -8,19 +8,25 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from photostrip.formats.text.findings import Findings
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import schema_of
 from photostrip.project.schema.ground import Output
 from photostrip.project.schema.processing import Processing
 from photostrip.project.schema.project_file import ProjectFile, Tolerances
-from photostrip.project.schema.sections import Problem, Section, read_section
-from photostrip.project.yaml import validation
+from photostrip.project.schema.sections import Section
+from photostrip.project.yaml.parsing import parse
+from photostrip.project.yaml.tree import Node, Place
+from photostrip.project.yaml.validation import checked, homes
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from photostrip.errors import Fault
+
+PLACE = Place("a.yaml", 1, 1)
 UNITS = {"principal_distance": "mm", "sigma0_um": "um", "check_rms_z": "m", "parallax_limit": "mm", "earth_radius": "m"}
 
 
@@ -29,7 +35,12 @@ def keys(schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[tuple[
     for name, each in schema.get("properties", {}).items():
         yield name, each
         inside: tuple[Any, ...] = (each, each.get("items"), each.get("additionalProperties"))
-        kinds = [kind for inner in inside if isinstance(inner, dict) for kind in inner.get("anyOf", ())]
+        kinds = [
+            kind
+            for inner in inside
+            if isinstance(inner, dict)
+            for kind in (*inner.get("anyOf", ()), *inner.get("oneOf", ()))
+        ]
         for inner in (*inside, *kinds):
             if isinstance(inner, dict) and "$ref" in inner:
                 yield from keys(definitions[inner["$ref"].rpartition("/")[2]], definitions)
@@ -82,8 +93,8 @@ def test_the_schema_is_the_same_on_every_call() -> None:
 @pytest.mark.parametrize(
     ("given", "part"),
     [
-        (Processing().relative.values(), "relative"),
-        (Processing().bundle.values(), "bundle"),
+        (dict(Processing().relative), "relative"),
+        (dict(Processing().bundle), "bundle"),
         ({"degree": Processing().polynomial.degree}, "polynomial"),
         ({"transform": Processing().interior.transform}, "interior"),
     ],
@@ -103,7 +114,7 @@ def test_every_setting_of_the_mathematics_has_a_key() -> None:
 
 
 def test_all_of_tolerances_and_output_may_be_left_out() -> None:
-    assert set(Tolerances().values().values()) == {None}
+    assert set(dict(Tolerances()).values()) == {None}
     assert Output().crs is None
 
 
@@ -113,29 +124,28 @@ def below(kind: type[Section]) -> list[type[Section]]:
 
 def test_every_section_refuses_unknown_keys() -> None:
     for kind in nonempty(below(Section)):
-        problems: list[Problem] = []
-        assert read_section(kind, {"unheard_of": "1"}, problems) is None
-        assert [each.path for each in problems if each.wrong.code == "unknown-key"] == [("unheard_of",)]
+        assert told(kind, {"unheard_of": Node("1", PLACE)})["unheard_of"].code == "unknown-key"
 
 
-def expected_at(value: object, path: tuple[str | int, ...]) -> list[str]:
-    """Give what is expected where a key of a project is missing."""
-    problems: list[Problem] = []
-    read_section(ProjectFile, value, problems)
-    return [each.wrong.expected for each in problems if each.path == path]
+def told(kind: type[Section], entries: dict[str, Node]) -> dict[str, Fault]:
+    """Give what is wrong with a file by its key."""
+    findings = Findings()
+    assert checked(kind, Node(entries, PLACE), findings) is None
+    return {fault.key: fault for fault in findings.faults}
 
 
 def test_keys_know_their_home() -> None:
-    assert validation.homes(ProjectFile)["grubbs_alpha"] == "processing.relative"
-    assert validation.homes(ProjectFile)["y_axis"] == "observations"
-    assert "cameras" not in validation.homes(ProjectFile)
+    assert homes(ProjectFile)["grubbs_alpha"] == "processing.relative"
+    assert homes(ProjectFile)["y_axis"] == "observations"
+    assert "cameras" not in homes(ProjectFile)
 
 
 def test_descriptions_are_found_through_lists_and_names() -> None:
-    missing = ("cameras", "format", "principal_distance")
-    assert expected_at({"cameras": {"format": {}}}, missing) == ["principal distance [mm]"]
-    (given,) = expected_at({"control": [{"crs": "local"}]}, ("control", 0, "file"))
-    assert given.startswith("table `point,x,y,z")
+    root = parse("{cameras: {format: {}}, control: [{crs: local}]}", "a.yaml", Findings())
+    assert root is not None
+    found = told(ProjectFile, root.entries)
+    assert found["cameras.format.principal_distance"].expected == "principal distance [mm]"
+    assert found["control[0].file"].expected.startswith("table `point,x,y,z")
 
 
 def pages() -> str:
@@ -170,7 +180,7 @@ def test_the_page_tells_every_default_and_unit() -> None:
 
 
 def test_the_model_is_the_contract() -> None:
-    assert list(ProjectFile.keys) == [
+    assert list(ProjectFile.model_fields) == [
         "photostrip",
         "name",
         "extends",

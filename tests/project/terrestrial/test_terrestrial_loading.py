@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.project.terrestrial.cameras import own_presets, read_presets
+from photostrip.project.terrestrial.cameras import known_presets, own_presets
+from photostrip.project.terrestrial.directions import CamerasFile
 from photostrip.project.terrestrial.survey import load_survey
+from photostrip.project.yaml.reading import read_keys
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
@@ -19,6 +21,15 @@ from tests.test_packaging import build
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from photostrip.terrestrial.normal_case import Phototheodolite
+
+
+def read_presets(file: str) -> dict[str, Phototheodolite]:
+    _, reading = read_keys(CamerasFile, None, [f"presets={file}"])
+    known = known_presets(reading)
+    reading.findings.stop()
+    return known
 
 
 def faults(path: Path, *overrides: str) -> list[str]:

@@ -92,12 +92,14 @@ def test_keys_know_their_place() -> None:
         ("- a\nb: 1", 2, "does not fit"),
         (" a: 1\nb: 2", 2, "does not fit"),
         ("a: *b", 1, "alias *b stands for nothing"),
-        ("a: &b\n  c: *b", 2, "alias *b stands for something it is part of"),
+        ("a: &b\n  c: *b", 1, "stands for the value itself"),
         ("<<: a", 1, "merge"),
         ("a: 1\na: 2", 2, "second time"),
         ("a: 1\n' a ': 2", 2, "second time"),
         ("a: 1\n...\n---\nb: 1", 3, "second document"),
-        ("a: {b: {c: [" + "[" * 30, 1, "nested"),
+        ("a: {b: {c: [" + "[" * 30 + "]" * 31 + "}}", 1, "nested"),
+        ("a: " + "[" * 2000 + "]" * 2000, 1, "nested"),
+        ("a: &x 1\nb: &x 2", 2, "the same &"),
         ("a: \x01", 1, "U+0001"),
         ("a: \ufffe", 1, "U+FFFE"),
     ],
@@ -157,12 +159,12 @@ def test_a_bracket_at_the_end_of_the_text_is_told_with_its_column() -> None:
 
 
 def test_an_alias_is_what_its_anchor_names() -> None:
-    root, findings = read("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos, e: &photos 7, f: *photos}")
+    root, findings = read("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos}")
     assert not findings.faults
     assert root is not None
     shared = ["x", {"k": "v"}]
-    assert root.plain == {"a": shared, "b": shared, "c": {"d": shared, "e": "7", "f": "7"}}
-    assert root.place_of(("b",)).line == 2  # where it is used
+    assert root.plain == {"a": shared, "b": shared, "c": {"d": shared}}
+    assert root.place_of(("b",)).line == 1  # where it would be put right
 
 
 def test_a_project_that_a_script_dumped_is_read() -> None:

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline.inputs import Settings
-from photostrip.report.pictures.result.pictures import pictures_of
+from photostrip.report.pictures.result import pictures_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
-from photostrip.strip.gross_errors.pairs.global_test import GlobalTest
+from photostrip.strip.gross_errors.pair_search import GlobalTest
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
 from tests.simulated import inputs_of
@@ -79,7 +79,7 @@ def test_the_histogram_has_the_limits() -> None:
     middle = float(np.median(known))
     assert f"median limit ±{middle:.1f} µm" in drawn.svg
     assert f"{known[0]:.1f} to {known[-1]:.1f} µm" in drawn.caption
-    assert drawn.svg.count('class="limit"') == 3  # two in the panel of the y parallaxes, one in the legend
+    assert drawn.svg.count('class="line failed dashed"') == 3  # two in the panel of the y parallaxes, one in the legend
     bundle = solved(case().inputs, Settings(adjustment="bundle")).document
     of_bundle = next(each for each in pictures_of(bundle) if each.name == "histogram")
     assert f"±{bundle['bundle']['screening']['limit']:.2f}" in of_bundle.svg

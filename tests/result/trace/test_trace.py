@@ -19,7 +19,7 @@ from photostrip.report.page.text import to_text
 from photostrip.result.trace.departures import CHOICES, departures_of
 from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulation.spec import GrossError
-from photostrip.strip.polynomial.correction import PolynomialSettings
+from photostrip.strip.polynomial import PolynomialSettings
 from tests.loops import nonempty
 from tests.results import case, spec, write_project
 from tests.results import solved as solve

@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.precision.photo_precision import photo_errors
+from photostrip.pipeline.precision import photo_errors
 from photostrip.pipeline.run import triangulate
-from photostrip.strip.error_propagation import fitted_strip as fitted
-from photostrip.strip.polynomial import correction
+from photostrip.strip import fitted_strip as fitted
+from photostrip.strip import polynomial
 from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.derivatives import (
     UNSCREENED,
     differenced,
-    differenced_by_control,
     fitted_strip,
     spec,
     without_noise,
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.pipeline.results import Result
-    from photostrip.strip.error_propagation.fitted_strip import FittedStrip
+    from photostrip.strip.fitted_strip import FittedStrip
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
@@ -45,7 +43,7 @@ def settings(adjustment: str, transfer: str = "least_squares", intersection: str
         adjustment="similarity" if adjustment == "similarity" else "polynomial",
         relative=UNSCREENED,
         formation=StripFormationSettings(transfer, intersection=intersection),
-        polynomial=correction.PolynomialSettings(degree),
+        polynomial=polynomial.PolynomialSettings(degree),
     )
 
 
@@ -104,21 +102,6 @@ def test_derivatives_are_those_of_the_whole_run(
             assert photos[:, part, column] / sigma == pytest.approx(expected, abs=close)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("adjustment", "use"), [("similarity", MIXED), ("3", None), ("1", MIXED)])
-def test_the_fit_passes_on_errors_of_the_control(adjustment: str, use: dict[str, float] | None) -> None:
-    inputs, wanted = without_noise(spec(7, use=use)), settings(adjustment)
-    result = triangulate(inputs, wanted)
-    found = fitted_strip(result)
-    by_control = points_of(found)[:, :, -len(found.control.point) :] / np.sqrt(found.control.variance)
-    names = [inputs.control.ids.index(name) for name in result.strips[0].control.ids]
-    for column in nonempty(range(0, len(found.control.point), 5)):
-        row, axis = names[found.control.point[column]], int(found.control.axis[column])
-        expected = differenced_by_control(result, row, axis, 0.01)
-        # a map's coordinates are those of the ground to within its scale; a level axis turns by the Earth's curvature
-        assert by_control[:, :, column] == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
-
-
 @pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (4, 70.0), (9, 80.0)])
 def test_covariances_are_products_of_derivatives(photos: int, lap: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of points and photos, some at a time, and of coordinates together; the variance factor is of images alone."""
@@ -142,53 +125,6 @@ def test_covariances_are_products_of_derivatives(photos: int, lap: float, monkey
     along = np.einsum("ni,nic->nc", directions, points[some])
     expected = along @ along.T
     assert found.joint_covariance(some, directions) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("doubt", [0.0, 1e-4])
-def test_parts_of_a_strip_have_the_covariances_of_the_whole(doubt: float) -> None:
-    """But for a similarity of all their points; doubts about scales count like other errors."""
-    result = triangulate(without_noise(spec(14)), settings("similarity"))
-    errors = fitted_strip(result).errors.with_doubt(np.full(12, doubt))
-    along = np.argsort(errors.xyz[:, 0], kind="stable")
-    for some in nonempty((along, along[:9], along[20:26], along[-9:])):
-        rows = errors.points(some)
-        design = similarity_derivatives(errors.xyz[some] - errors.xyz[some].mean(axis=0), np.zeros(3)).reshape(-1, 7)
-        left = np.eye(len(design)) - design @ np.linalg.pinv(design)  # after a similarity
-        whole = left @ written_out(errors, rows)
-        expected = whole @ whole.T
-        close = 1e-9 * np.abs(expected).max()
-        assert left @ errors.joint_covariance(rows, errors.frames(rows)[0]) @ left.T == pytest.approx(
-            expected, abs=close
-        )
-
-
-def test_the_operator_makes_the_correction_that_was_made() -> None:
-    """Parameters times misclosures of a noisy strip are what the run subtracted."""
-    wanted = settings("3")
-    inputs = without_noise(spec(9))
-    rng = np.random.default_rng(4)
-    noisy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
-    result = triangulate(replace(inputs, observations=replace(inputs.observations, xy=noisy)), wanted)
-    (strip,) = result.strips
-    found = fitted_strip(result)
-    similar = strip.absolute.similarity(strip.formed.xyz)
-    given = strip.absolute.misclosures[found.control.point, found.control.axis]
-    moved = similar - found.fit.influence(found.xyz) @ (found.fit.operator @ given)
-    assert moved == pytest.approx(strip.xyz, abs=1e-6)
-
-
-def test_a_photo_goes_where_all_its_points_go() -> None:
-    """Points that move together take the photo with them: the sum over its points is a motion of the whole."""
-    result = triangulate(without_noise(spec(6)), settings("similarity"))
-    errors = fitted_strip(result).errors
-    centers = result.strips[0].of_photos.resection.centers - errors.origin
-    by = photo_errors(result.strips[0], errors, result.refined.observations)
-    together = similarity_derivatives(errors.xyz, np.zeros(3)).reshape(-1, 7)
-    photos = (by.by_point @ together).reshape(6, 6, 7)
-    assert photos[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert photos[:, :3, 6] == pytest.approx(centers, abs=1e-6)
-    assert photos[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert photos[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.slow

@@ -10,10 +10,10 @@ import pytest
 
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import DIGITAL, Flight, Ground, Image, Points, Spec, Terrain, simulate
-from photostrip.strip.error_propagation.weak_pairs import times_a_good_pair
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import Pairs
 from photostrip.strip.relative_orientation.solution import base_rays, solve_elements, turns
+from photostrip.strip.strip_errors import times_a_good_pair
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -61,11 +61,6 @@ def scatter(elements: Floats, pairs: Pairs) -> float:
     rotations = turns(elements)[0][pairs.pair]
     points = np.einsum("mi,mij->mj", in_base, rotations).reshape(pairs.size, -1, 3)
     return float(np.sqrt(points.var(axis=0).sum(axis=1).mean()))
-
-
-@pytest.mark.parametrize("kappa", [0.0, 2.0])
-def test_a_pair_of_six_standard_points_is_a_good_one(kappa: float) -> None:
-    assert of(*band(BASE, kappa)) == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("spread", "kappa"), [(BASE / 8, 0.0), (BASE / 3, 2.0), (1.3 * BASE, 1.0)])

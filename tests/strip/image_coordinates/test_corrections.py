@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import CubicSpline
 
 from photostrip.camera import Camera, Distortion
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections, lens_distortion
-from photostrip.strip.image_coordinates.corrections import Bending, Refined, curvature_constant, refraction_constant
-from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
+from photostrip.strip.image_coordinates.corrections import (
+    Bending,
+    ImageCorrectionSettings,
+    Refined,
+    curvature_constant,
+    refraction_constant,
+)
 
 Floats = NDArray[np.float64]
 
-DATA = Path(__file__).parents[2] / "data" / "interior"
 MICROMETRE = 1e-3  # mm
 PICOMETRE = 1e-9
 FOCAL = 153.0
@@ -30,21 +32,6 @@ FORWARD, BACKWARD = "image_to_ideal", "ideal_to_image"
 directions = pytest.mark.parametrize("direction", [FORWARD, BACKWARD])
 PLAIN = Camera("plain", FOCAL, format=(230.0, 230.0))
 NODES = tuple(np.arange(0.0, 171.0, 10.0))
-
-
-def refraction_shift(radius: Floats | float, principal_distance: float, constant: float) -> Floats:
-    """Outward shift dr = K (r + r^3 / f^2) of image points by refraction [Saastamoinen 1972].
-
-    Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which the orientation takes up.
-    """
-    r = np.asarray(radius, float)
-    return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
-
-
-def old_lens(radius: Floats) -> Floats:
-    """Distortion of an old wide-angle lens, mm: -4 to 8 micrometres, odd in the radius."""
-    u = np.asarray(radius) / 110
-    return np.asarray(1e-3 * u * (-23.1 + 77.3 * u**2 - 31.4 * u**4 - 18.9 * u**6))
 
 
 def table(direction: str, nodes: tuple[float, ...] = NODES) -> Distortion:
@@ -126,16 +113,6 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
     assert np.abs(again - ideal).max() < PICOMETRE
 
 
-@pytest.mark.slow
-@given(cameras, image_points)
-def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
-    settings = ImageCorrectionSettings(refraction=True, flying_height=3000.0, ground_height=200.0)
-    found = refine(image, camera, settings).observations
-    constant = Bending(refraction_constant(3000.0, 200.0))
-    assert np.array_equal(found.xy, corrections.undistort(image, camera, constant))
-    assert found.photo_ids == ("1",)
-
-
 def test_the_order_is_principal_point_distortion_refraction_curvature() -> None:
     camera = replace(PLAIN, principal_point=(0.5, -0.3), distortion=brown(FORWARD, (3e-7, 0.0, 0.0)))
     x, y = 100.5, -70.3
@@ -181,13 +158,6 @@ def test_the_jacobian_agrees_with_differences(distortion: Distortion, points: Fl
 # ------------------------------------------------------------------------------------------- signs
 
 
-def test_the_principal_point_itself_becomes_the_origin() -> None:
-    camera = replace(PLAIN, principal_point=(0.012, -0.004), distortion=table(FORWARD))
-    found = refine(np.array([[0.012, -0.004]]), camera)
-    assert np.array_equal(found.observations.xy, [[0.0, 0.0]])
-    assert found.largest_um == {"principal point": pytest.approx(12.65, abs=0.01), "distortion": 0.0}
-
-
 @directions
 def test_a_pincushion_image_is_drawn_in(direction: str) -> None:
     """A lens that draws the corners out: the image is larger than the ideal, in whatever direction it is written."""
@@ -199,34 +169,7 @@ def test_a_pincushion_image_is_drawn_in(direction: str) -> None:
     assert found.largest_um["distortion"] == pytest.approx(100.0, rel=0.005)
 
 
-@directions
-def test_a_table_has_the_sign_of_its_direction(direction: str) -> None:
-    distortion = Distortion(
-        "radial-table", direction, radius=(0.0, 50.0, 100.0, 150.0), distortion=(0.0, 0.003, 0.006, 0.009)
-    )
-    camera = replace(PLAIN, format=None, distortion=distortion)
-    image = np.array([[60.0, -80.0]])
-    expected = image * (1 + 6e-5) if direction == FORWARD else image / (1 + 6e-5)
-    assert corrections.undistort(image, camera) == pytest.approx(expected, abs=1e-9)
-
-
 # ------------------------------------------------------------------------------------------- tables
-
-
-def test_a_spline_through_a_cubic_is_the_cubic() -> None:
-    polynomial = brown(FORWARD, (3e-8, 0.0, 0.0))
-    for nodes in ((60.0, 170.0), (0.0, 20.0, 50.0, 90.0, 170.0), NODES):
-        tabulated = Distortion("radial-table", FORWARD, radius=nodes, distortion=tuple(3e-8 * r**3 for r in nodes))
-        points = np.random.default_rng(1).uniform(-110, 110, (200, 2))
-        assert (
-            np.abs(lens_distortion.shift(points, tabulated) - lens_distortion.shift(points, polynomial)).max() < 1e-12
-        )
-        assert np.allclose(
-            lens_distortion.jacobian(points, tabulated),
-            lens_distortion.jacobian(points, polynomial),
-            rtol=0,
-            atol=1e-12,
-        )
 
 
 def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
@@ -237,43 +180,6 @@ def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
     found = lens_distortion.shift(np.stack([radius, np.zeros_like(radius)], -1), distortion)
     assert np.abs(found[:, 0] - other(radius)).max() < 1e-12
     assert not found[:, 1].any()
-
-
-@given(st.floats(0, 170), st.floats(0, 2 * np.pi))
-def test_a_table_is_the_same_in_all_directions(radius: float, azimuth: float) -> None:
-    direction = np.array([np.cos(azimuth), np.sin(azimuth)])
-    found = lens_distortion.shift(radius * direction[None], table(FORWARD))[0]
-    along_x = lens_distortion.shift(np.array([[radius, 0.0]]), table(FORWARD))[0, 0]
-    assert found == pytest.approx(along_x * direction, abs=1e-12)
-
-
-def test_the_values_of_the_table_are_kept() -> None:
-    rows = np.loadtxt(DATA / "published_distortion.csv", delimiter=",", skiprows=1)
-    distortion = Distortion("radial-table", FORWARD, radius=tuple(rows[:, 0]), distortion=tuple(rows[:, 1]))
-    found = lens_distortion.shift(np.stack([rows[:, 0], 0 * rows[:, 0]], -1), distortion)
-    assert found[:, 0] == pytest.approx(rows[:, 1], abs=1e-12)
-    between = lens_distortion.shift(np.stack([np.linspace(0, 110, 500), np.zeros(500)], -1), distortion)[:, 0]
-    # a spline may swing over: on this table, rounded to micrometres, by 0.1 micrometres
-    assert rows[:, 1].min() - 0.0001 < between.min()
-    assert between.max() < rows[:, 1].max() + 0.0001
-
-
-@pytest.mark.parametrize(
-    ("step", "spline_um", "monotone_um", "lines_um"), [(10.0, 0.05, 0.25, 0.7), (22.0, 0.6, 1.5, 2.5)]
-)
-def test_the_spline_follows_a_lens_better_than_other_interpolations(
-    step: float, spline_um: float, monotone_um: float, lines_um: float
-) -> None:
-    nodes, radius = np.arange(0, 111, step), np.linspace(0, 110, 1101)
-    distortion = Distortion("radial-table", FORWARD, radius=tuple(nodes), distortion=tuple(old_lens(nodes)))
-    found = lens_distortion.shift(np.stack([radius, 0 * radius], -1), distortion)[:, 0]
-
-    def off_um(values: Floats) -> float:
-        return float(np.abs(values - old_lens(radius)).max() / MICROMETRE)
-
-    assert off_um(found) < spline_um
-    assert off_um(PchipInterpolator(nodes, old_lens(nodes))(radius)) > monotone_um
-    assert off_um(np.interp(radius, nodes, old_lens(nodes))) > lines_um
 
 
 @directions
@@ -289,23 +195,6 @@ def test_points_beyond_the_table_are_refused_by_name(direction: str) -> None:
     for convert in (corrections.distort, corrections.undistort):
         with pytest.raises(InputError, match="lies beyond the distortion table"):
             convert(image, camera)
-
-
-def test_of_many_points_beyond_the_table_the_first_are_named_and_all_counted() -> None:
-    camera = replace(PLAIN, format=None, distortion=table(FORWARD, (0.0, 50.0, 100.0)))
-    with pytest.raises(InputError) as caught:
-        refine(np.full((50, 2), 90.0), camera)
-    assert len(caught.value.faults) == corrections.SHOWN + 1
-    assert caught.value.faults[-1].message == "30 more points lie beyond the distortion table of camera plain"
-
-
-@directions
-def test_the_last_radius_of_a_table_belongs_to_it(direction: str) -> None:
-    camera = replace(PLAIN, format=None, distortion=table(direction, (0.0, 50.0, 100.0)))
-    image_limit, ideal_limit = lens_distortion.reach(table(direction, (0.0, 50.0, 100.0)))
-    ideal = corrections.undistort(np.array([[0.0, image_limit]]), camera)
-    assert ideal == pytest.approx(np.array([[0.0, ideal_limit]]), abs=PICOMETRE)
-    assert sorted([image_limit, ideal_limit]) == pytest.approx([100 + 0.02 * np.sin(100 / 28), 100.0], abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -352,30 +241,6 @@ def test_distortion_that_folds_the_photo_is_refused(direction: str, k1: float, f
         assert turn - 0.06 < radius < turn + 0.01 * 162.7 + 0.06
         with pytest.raises(InputError, match="the distortion has no inverse"):
             refine(np.array([[10.0, 10.0]]), camera)
-
-
-def test_only_the_format_and_the_measured_points_must_have_an_inverse() -> None:
-    folds_at_105 = brown(FORWARD, (-1 / (3 * 105.0**2), 0.0, 0.0))
-    small = Camera("small", 50.0, format=(100.0, 100.0), distortion=folds_at_105)
-    assert not lens_distortion.faults(small)
-    assert lens_distortion.faults(replace(small, format=(160.0, 160.0)))
-    assert lens_distortion.faults(replace(small, principal_point=(40.0, 40.0)))
-    assert lens_distortion.faults(small, 110.0)
-    assert not lens_distortion.faults(replace(small, format=None))
-    with pytest.raises(InputError, match="folds"):
-        refine(np.array([[0.0, 110.0]]), replace(small, format=None))
-    with pytest.raises(GeometryError, match="no inverse at some point"):
-        corrections.distort(np.array([[90.0, 0.0]]), small)  # the largest ideal radius is 70 mm
-
-
-def test_an_ideal_point_may_lie_farther_out_than_its_image() -> None:
-    """Barrel distortion written from the ideal to the image folds beyond the format, not in it."""
-    camera = replace(PLAIN, format=(160.0, 160.0), distortion=brown(BACKWARD, (-9e-6, 0.0, 0.0)))  # images to 128.3 mm
-    image = np.array([[80.0, 80.0], [-80.0, 1.0]])
-    assert not lens_distortion.faults(camera)
-    ideal = refine(image, camera).observations.xy
-    assert np.hypot(*ideal[0]) > 135
-    assert np.abs(corrections.distort(ideal, camera) - image).max() < PICOMETRE
 
 
 # ------------------------------------------------------------------------------------------- refraction
@@ -435,46 +300,12 @@ def test_refraction_is_that_of_a_ray_through_the_standard_atmosphere(
     assert found.largest_um == {"refraction": pytest.approx((radius - ideal) / MICROMETRE, rel=0.004)}
 
 
-@HEIGHTS
-def test_the_curvature_of_the_layers_does_not_matter(flying: float, ground: float) -> None:
-    """Two rays that differ by refraction only, through round layers: what the plane formula leaves."""
-    bent, _ = traced(150.0, flying, ground, 6_371_000.0)
-    constant = refraction_constant(flying, ground)
-    assert abs(150.0 - refraction_shift(150.0, FOCAL, constant) - bent) < 0.1 * MICROMETRE
-
-
-@pytest.mark.parametrize(
-    ("flying", "ground", "off"), [(1000.0, 0.0, -0.22), (5000.0, 0.0, -0.05), (8000.0, 4000.0, 0.68)]
-)
-def test_why_the_formula_with_2410_is_not_used(flying: float, ground: float, off: float) -> None:
-    """The form printed in many textbooks (ARDC atmosphere), against the ray."""
-    H, h = flying / 1000, ground / 1000
-    constant = (2410 * H / (H**2 - 6 * H + 250) - 2410 * h / (h**2 - 6 * h + 250) * h / H) * 1e-6
-    shift = 90.0 - traced(90.0, flying, ground)[0]
-    assert constant * (90 + 90**3 / FOCAL**2) / shift - 1 == pytest.approx(off, abs=0.01)
-
-
 def test_the_constant_agrees_with_the_printed_formula() -> None:
     for flying, ground in ((1000.0, 0.0), (5000.0, 300.0), (11_000.0, 2000.0)):
         H, h = flying / 1000, ground / 1000
         printed = 2335 / (H - h) * ((1 - 0.02257 * h) ** 5.256 - (1 - 0.02257 * H) ** 5.256)
         printed = (printed - 277.0 * (1 - 0.02257 * H) ** 4.256) * 1e-6
         assert refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
-
-
-def test_the_constant_runs_on_through_the_tropopause() -> None:
-    below, at, above = (refraction_constant(11_000.0 + d, 0.0) for d in (-1, 0, 1))
-    assert 0 < at - below < 1e-8
-    assert 0 < above - at < 1e-8  # steeper, because the density falls faster above, but without a jump
-
-
-@given(st.floats(0, 170), st.floats(1000, 12_000))
-def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> None:
-    constant = refraction_constant(flying, 0.0)
-    found = refraction_shift(radius, FOCAL, constant)
-    assert found == pytest.approx(constant * (radius + radius**3 / FOCAL**2), rel=1e-12)
-    corrected = corrections.undistort(np.array([[radius, 0.0]]), PLAIN, Bending(constant))
-    assert corrected[0, 0] == pytest.approx(radius - found, abs=1e-12)
 
 
 def test_refraction_without_heights_or_below_the_ground_is_refused() -> None:
@@ -504,38 +335,7 @@ def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg:
     assert found[0, 1] == pytest.approx(seen + missing, abs=0.01 * missing)
 
 
-def test_the_textbook_size_of_curvature() -> None:
-    # wide angle, 1:30 000, 140 mm from the middle: dr = r^3 H / (2 R f^2)
-    bending = Bending(curvature=curvature_constant(4590.0, 0.0, 6370000.0))
-    found = corrections.undistort(np.array([[140.0, 0.0]]), PLAIN, bending)
-    assert found[0, 0] - 140.0 == pytest.approx(140.0**3 * 4590.0 / (2 * 6370000.0 * FOCAL**2), rel=1e-9)
-    assert 0.0421 < found[0, 0] - 140.0 < 0.0423
-
-
-def test_curvature_tells_its_largest_shift_and_needs_heights() -> None:
-    image = np.array([[140.0, 0.0], [10.0, 0.0]])
-    settings = ImageCorrectionSettings(earth_radius=6370000.0, flying_height=4590.0, ground_height=0.0)
-    assert refine(image, PLAIN, settings).largest_um == {"earth curvature": pytest.approx(42.2, abs=0.1)}
-    with pytest.raises(InputError, match="earth_curvature: flying height and height of the ground are not known"):
-        refine(image, PLAIN, ImageCorrectionSettings(earth_radius=6370000.0))
-    with pytest.raises(InputError, match="earth_curvature: the flying height 4590 m is not above the ground, 5000 m"):
-        refine(image, PLAIN, replace(settings, ground_height=5000.0))
-
-
 # ------------------------------------------------------------------------------------------- tables of photos
-
-
-def test_each_photo_gets_its_camera() -> None:
-    first = replace(PLAIN, name="first", principal_point=(1.0, 0.0))
-    second = replace(PLAIN, name="second", distortion=brown(FORWARD, (1e-7, 0.0, 0.0)))
-    image = np.array([[30.0, 40.0], [60.0, 80.0]])
-    used = {"a": first, "b": second, "c": PLAIN, "d": first}
-    found = corrections.refine(observed(image, tuple(used)), used, ImageCorrectionSettings())
-    expected = np.vstack([corrections.undistort(image, camera) for camera in used.values()])
-    assert np.array_equal(found.observations.xy, expected)
-    assert np.array_equal(found.observations.xy[4:6], image)
-    assert found.largest_um == {"principal point": pytest.approx(1000.0), "distortion": pytest.approx(100.0)}
-    assert np.array_equal(found.observations.sigma, np.full((8, 2), 0.005))
 
 
 def test_every_fault_of_every_camera_is_told_at_once() -> None:
@@ -546,22 +346,6 @@ def test_every_fault_of_every_camera_is_told_at_once() -> None:
             observed(np.full((1, 2), 60.0), ("a", "b")), {"a": folding, "b": short}, ImageCorrectionSettings()
         )
     assert [fault.code for fault in caught.value.faults] == ["distortion-folds", "beyond-distortion-table"]
-
-
-def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
-    photos = tuple(f"{i}" for i in range(1000))
-    measured = observed(np.random.default_rng(1).uniform(-110, 110, (30, 2)), photos)
-    assert (
-        corrections.refine(measured, dict.fromkeys(photos, PLAIN), ImageCorrectionSettings()).observations is measured
-    )
-    zeros = replace(PLAIN, distortion=brown(FORWARD, (0.0, 0.0, 0.0)))
-    nothing = corrections.refine(measured, dict.fromkeys(photos, zeros), ImageCorrectionSettings())
-    assert nothing.largest_um == {"distortion": 0.0}
-    assert np.array_equal(nothing.observations.xy, measured.xy)
-    full = replace(PLAIN, principal_point=(0.01, 0.02), distortion=brown(BACKWARD, (1e-7, 0.0, 0.0), (1e-6, 1e-6)))
-    start = time.perf_counter()
-    corrections.refine(measured, dict.fromkeys(photos, full), ImageCorrectionSettings())
-    assert time.perf_counter() - start < 2.0  # 0.03 s measured
 
 
 @pytest.mark.parametrize(("off", "effect"), [("principal_point", "principal point"), ("distortion", "distortion")])

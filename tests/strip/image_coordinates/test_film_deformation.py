@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from photostrip.camera import Camera
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import interior
+from photostrip.strip.image_coordinates.corrections import InteriorSettings
 from photostrip.strip.image_coordinates.interior import FilmDeformation
-from photostrip.strip.image_coordinates.settings import InteriorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,15 +60,6 @@ def rms_um(marks: dict[str, tuple[float, float]], residuals: str) -> float:
     return float(np.sqrt(((interior.transform(points, found).xy - truth) ** 2).mean()) / MICROMETRE)
 
 
-def test_the_marks_come_to_their_calibrated_places() -> None:
-    cameras, fiducials, _, _ = surveyed(EIGHT)
-    found = interior.orient(fiducials, cameras, InteriorSettings("affine", "interpolate"))
-    calibrated = np.array(list(EIGHT.values()))[fiducials.point]
-    assert np.abs(interior.transform(fiducials, found).xy - calibrated).max() < PICOMETRE
-    plain = interior.orient(fiducials, cameras, InteriorSettings("affine"))
-    assert np.abs(interior.transform(fiducials, plain).xy - calibrated).max() > 5 * MICROMETRE
-
-
 @given(st.integers(0, 2**32 - 1))
 def test_the_spline_goes_through_the_marks(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -86,21 +77,6 @@ def test_interpolation_helps_as_far_as_the_marks_see_the_bend(
     marks: dict[str, tuple[float, float]], least: float, most: float
 ) -> None:
     assert least < rms_um(marks, "interpolate") / rms_um(marks, "ignore") < most
-
-
-def test_without_deformation_it_costs_the_scatter_of_the_marks() -> None:
-    cameras, fiducials, points, _ = surveyed(EIGHT)
-    flat = PhotoPoints(
-        PHOTOS,
-        fiducials.point_ids,
-        fiducials.photo,
-        fiducials.point,
-        np.array(list(EIGHT.values()))[fiducials.point] + np.random.default_rng(1).normal(0, 0.003, fiducials.xy.shape),
-        fiducials.sigma,
-    )
-    ways = [interior.orient(flat, cameras, InteriorSettings("affine", way)) for way in ("ignore", "interpolate")]
-    moved = [interior.transform(points, found).xy - points.xy for found in ways]
-    assert 1.4 < np.sqrt((moved[1] ** 2).mean() / (moved[0] ** 2).mean()) < 2.2
 
 
 def test_photos_whose_marks_cannot_tell_are_named() -> None:

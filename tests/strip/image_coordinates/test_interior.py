@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,10 +14,8 @@ from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import interior
-from photostrip.strip.image_coordinates.fiducial_marks import WRONG_PATTERN, right_pattern
-from photostrip.strip.image_coordinates.fiducial_marks import Marks as MarksOfPhotos
+from photostrip.strip.image_coordinates.corrections import InteriorSettings
 from photostrip.strip.image_coordinates.interior import InteriorOrientation, linear_shape
-from photostrip.strip.image_coordinates.settings import InteriorSettings
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -31,7 +28,6 @@ if TYPE_CHECKING:
 
 DATA = Path(__file__).parents[2] / "data" / "interior"
 MICROMETRE = 1e-3  # mm
-NANOMETRE = 1e-6
 PICOMETRE = 1e-9
 CORNERS = Camera(
     "RC30",
@@ -189,20 +185,6 @@ def test_sigma0_is_the_precision_of_the_marks() -> None:
     assert not found.notes
 
 
-def test_weights_follow_the_standard_deviations() -> None:
-    rng = np.random.default_rng(8)
-    marks = film(EIGHT, rng, noise=0.0)
-    marks["F1"] = marks["F1"] + [0.3, -0.2]
-    sigma = dict.fromkeys(EIGHT.fiducials, 0.005) | {"F1": 0.5}
-    found = interior.orient(table({"1": marks}, sigma), {"1": EIGHT}, InteriorSettings())
-    row = found.marks[0].index("F1")
-    assert np.linalg.norm(np.delete(found.residuals[0], row, 0), axis=1).max() < 0.05 * MICROMETRE
-    assert np.linalg.norm(found.residuals[0][row]) == pytest.approx(np.hypot(0.3, 0.2), rel=3e-3)
-    # residual 0.36 mm with weight 1e-4, where the other seven have 1 and the mean is 1
-    expected = np.sqrt(1e-4 / ((7 + 1e-4) / 8) * (0.3**2 + 0.2**2) / 10)
-    assert found.sigma0[0] == pytest.approx(expected, rel=0.01)
-
-
 def trapezoid(xy: Floats) -> Floats:
     """A photo copied from a tilted print: 30 micrometres at the corners."""
     return np.asarray(xy * (1 + 2.7e-6 * xy[..., :1]))
@@ -227,12 +209,6 @@ def test_what_an_affine_transformation_leaves_the_higher_ones_take(
     assert (affine.redundancy[0], higher.redundancy[0]) == (2, 0)
     assert affine.sigma0[0] > 10 * MICROMETRE
     assert np.isnan(higher.sigma0[0])
-
-
-def test_standard_deviations_go_through_scale_and_turn() -> None:
-    found = orient({"1": moved(calibrated(CORNERS), 20 * quarter_turns(1))})  # pixels of 0.05 mm, turned
-    image = interior.transform(points(("1",), np.array([[100.0, 200.0]]), sigma=(0.4, 0.2)), found)
-    assert image.sigma == pytest.approx(np.array([[0.2 / 20, 0.4 / 20]]))
 
 
 # --------------------------------------------------------------------------------------- how many marks
@@ -275,12 +251,6 @@ def test_marks_on_one_line_are_refused_by_name() -> None:
     assert orient({"1": calibrated(line)}, line).transforms == ("conformal",)
 
 
-def test_marks_in_the_middle_of_the_sides_do_not_give_a_bilinear_term() -> None:
-    (message,) = messages({"1": calibrated(SIDES)}, SIDES, "bilinear")
-    assert "L, B, R, T lie so that not all of its coefficients can be told: no bilinear" in message
-    assert orient({"1": calibrated(SIDES)}, SIDES, "projective").transforms == ("projective",)
-
-
 def test_every_fault_of_every_photo_is_told_at_once() -> None:
     marks = calibrated(CORNERS)
     photos: dict[str, Marks] = {
@@ -295,14 +265,6 @@ def test_every_fault_of_every_photo_is_told_at_once() -> None:
     assert [message.partition(":")[0] for message in found] == [f"photo {i}" for i in (4, 3, 6, 2, 5)]
     assert found[0] == "photo 4: camera RC30 has no mark F9"
     assert "all fiducial marks have the same coordinates" in found[3]
-
-
-def test_a_mark_measured_twice_is_refused() -> None:
-    once = table({"1": calibrated(CORNERS)})
-    rows = [0, 1, 2, 3, 0]
-    twice = PhotoPoints(("1",), once.point_ids, once.photo[rows], once.point[rows], once.xy[rows], once.sigma[rows])
-    with pytest.raises(InputError, match="photo 1: mark F1 is measured 2 times"):
-        interior.orient(twice, {"1": CORNERS}, InteriorSettings())
 
 
 # ------------------------------------------------------------------------------------- turned and mirrored
@@ -371,20 +333,6 @@ def test_two_exchanged_marks_are_found_and_named(camera: Camera, mirrored: bool,
     assert any(named), message
 
 
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_exchanged_marks_of_one_single_photo_are_found_where_the_pattern_shows_them(camera: Camera) -> None:
-    marks = calibrated(camera)
-    # opposite marks of a square: the mirror image fits exactly; without other photos it can only be told, not decided
-    silent = {"RC30": ["F1 F3", "F2 F4"], "RMK": ["L R", "B T"]}.get(camera.name, [])
-    for a, b in nonempty(combinations(marks, 2)):
-        photo = {"1": exchanged(marks, a, b)}
-        if f"{a} {b}" in silent:
-            assert "photos-mirrored" in codes(orient(photo, camera))
-        else:
-            (message,) = messages(photo, camera)
-            assert f"with {a} and {b} exchanged" in message
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("camera", CAMERAS)
 @given(seed=SEEDS)
@@ -395,18 +343,6 @@ def test_a_mark_with_the_number_of_one_not_measured_is_found(camera: Camera, see
     photos["1"][wrong] = photos["1"].pop(missing)
     (message,) = messages(photos, camera)
     assert f"with {wrong} called {missing}" in message
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("camera", CAMERAS)
-@given(seed=SEEDS)
-def test_a_point_taken_for_a_mark_is_found(camera: Camera, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    photos = {f"{i}": film(camera, rng) for i in range(3)}
-    wrong = rng.choice(list(camera.fiducials))
-    photos["1"][wrong] = photos["1"][wrong] + rng.choice([-1, 1], 2) * rng.uniform(25, 45, 2)
-    (message,) = messages(photos, camera)
-    assert f"without {wrong} the largest residual is 0." in message
 
 
 def test_a_photo_of_another_camera_is_refused_without_a_guess() -> None:
@@ -425,15 +361,6 @@ def test_no_false_alarm_on_old_film_and_paper(camera: Camera) -> None:
     found = orient(photos, camera)
     assert len(found.photo_ids) == 1000
     assert not {"photos-turned", "photos-mirrored"} & set(codes(found))
-
-
-def test_the_limit_of_the_pattern_stands_between_film_and_wrong_numbers() -> None:
-    """The least that two exchanged marks can do, over what 1 % of shrinkage does."""
-    marks = np.array(list(EIGHT.fiducials.values()))
-    radius = np.sqrt((marks**2).sum(1).mean())
-    nearest = min(np.linalg.norm(a - b) for a, b in combinations(marks, 2))
-    assert 0.005 * np.hypot(*marks.T).max() / radius < WRONG_PATTERN / 5
-    assert nearest / 2 / radius > 5 * WRONG_PATTERN
 
 
 # ------------------------------------------------------------------------------------------- other remarks
@@ -458,20 +385,6 @@ def test_an_odd_affinity_is_told() -> None:
     assert "scales that differ by 1.5 % and a shear of 0.00 degrees (photo 1)" in found.notes[0].message
 
 
-def test_photos_of_several_cameras_keep_the_order_of_the_project() -> None:
-    rng = np.random.default_rng(4)
-    cameras = {"a": CORNERS, "b": DIGITAL, "c": EIGHT, "d": CORNERS, "e": SIDES}
-    photos = {photo: film(cameras[photo], rng) for photo in "edca"}
-    found = interior.orient(table(photos), cameras, InteriorSettings())
-    assert found.photo_ids == ("a", "c", "d", "e")
-    assert found.without_marks == ("b",)
-    for row, photo in nonempty(enumerate(found.photo_ids)):
-        alone = orient({photo: photos[photo]}, cameras[photo])
-        assert np.array_equal(found.residuals[row], alone.residuals[0])
-        assert np.array_equal(found.photo_from_measured.coefficients[row], alone.photo_from_measured.coefficients[0])
-        assert (found.sigma0[row], found.rotation[row]) == (alone.sigma0[0], alone.rotation[0])
-
-
 def test_digital_photos_pass_as_they_are() -> None:
     found = interior.orient(table({"a": calibrated(CORNERS)}), {"a": CORNERS, "b": DIGITAL}, InteriorSettings())
     measured = points(("a", "b"), np.array([[1.0, 2.0], [30.0, -40.0]]))
@@ -483,33 +396,7 @@ def test_digital_photos_pass_as_they_are() -> None:
     assert interior.transform(only, nothing) is only
 
 
-def test_marks_on_a_photo_of_a_camera_without_marks_are_refused() -> None:
-    with pytest.raises(InputError, match="photo b: fiducial marks are measured, but camera DMC has none"):
-        interior.orient(table({"b": calibrated(CORNERS)}), {"b": DIGITAL}, InteriorSettings())
-
-
-def test_marks_of_photos_in_no_strip_are_left_aside() -> None:
-    found = interior.orient(
-        table({"a": calibrated(CORNERS), "x": {}, "y": {"F1": np.zeros(2)}}), {"a": CORNERS}, InteriorSettings()
-    )
-    assert found.photo_ids == ("a",)
-    assert found.notes[0].photos == ("x", "y")
-    assert found.notes[0].message == "fiducial marks of photos x, y are not used: not in any strip"
-
-
 def test_points_of_a_photo_without_orientation_are_refused() -> None:
     found = orient({"a": calibrated(CORNERS)})
     with pytest.raises(InputError, match="photo z: no fiducial marks measured"):
         interior.transform(points(("a", "z"), np.zeros((1, 2))), found)
-
-
-@pytest.mark.parametrize(("percent", "right"), [(4.5, True), (5.5, False)])
-def test_a_pattern_may_be_wrong_by_a_twentieth_of_its_radius(percent: float, *, right: bool) -> None:
-    """A corner off its place by d towards the middle leaves d / 2 to a similarity of four: lever 1/4 + 1/4."""
-    truth = np.array(list(CORNERS.fiducials.values()))
-    measured = np.repeat(truth[None], 3, axis=0)
-    measured[1, 0] *= 1.0 - 2.0 * percent / 100.0
-    marks = MarksOfPhotos(CORNERS, ("1", "2", "3"), tuple(CORNERS.fiducials), truth, measured, np.ones((3, 4)))
-    kept, faults = right_pattern(marks)
-    assert kept.photos == (("1", "2", "3") if right else ("1", "3"))
-    assert len(faults) == (not right)

@@ -10,7 +10,7 @@ import pytest
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
 from photostrip.strip.image_coordinates.lens_distortion import image_from_ideal
-from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PixelCamera, in_millimetres, in_pixels
+from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PixelCamera, in_millimetres
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
@@ -68,17 +68,6 @@ def test_pixels_are_those_of_the_documentation(convention: str) -> None:
     assert by_us(in_millimetres("c", camera, 0.004)) == pytest.approx(by_documentation(camera), abs=1e-9)
 
 
-@pytest.mark.parametrize("convention", CONVENTIONS)
-@pytest.mark.parametrize("size", [0.001, 0.0039])
-def test_the_numbers_come_back(convention: str, size: float) -> None:
-    camera = given(convention)
-    back = in_pixels(in_millimetres("c", camera, size), convention, SIZE)
-    assert back.focal_length == pytest.approx(camera.focal_length, rel=1e-15)
-    assert back.principal_point == pytest.approx(camera.principal_point, rel=1e-12)
-    kept = {name: value for name, value in camera.distortion.items() if name not in CONVENTIONS[convention].others}
-    assert back.distortion == pytest.approx(kept, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("model", "parameters"),
     [
@@ -102,11 +91,3 @@ def test_what_has_no_counterpart_is_refused_by_name(convention: str, name: str) 
     camera = PixelCamera(convention, SIZE, (3100.0, 3100.0), principal_point=(0.0, 0.0), distortion={name: 0.01})
     with pytest.raises(InputError, match=f"the coefficient {name} of {convention} has no counterpart"):
         in_millimetres("c", camera)
-
-
-def test_a_camera_that_no_such_program_has_is_refused() -> None:
-    lens = Distortion("brown", "image_to_ideal", k=(1e-8, 0.0, 0.0))
-    with pytest.raises(InputError, match="the distortion of camera RC30 goes from the image to ideal coordinates"):
-        in_pixels(Camera("RC30", 153.0, distortion=lens), "opencv", SIZE)
-    with pytest.raises(InputError, match="pixels of camera c are sheared, which opencv does not know"):
-        in_pixels(in_millimetres("c", given("metashape")), "opencv", SIZE)

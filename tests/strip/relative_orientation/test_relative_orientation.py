@@ -17,10 +17,9 @@ from photostrip.notes import counted
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
-from photostrip.strip.error_propagation.image_variance import image_variance
+from photostrip.strip.fitted_strip import image_variance
 from photostrip.strip.relative_orientation.orientation import (
     assess_pairs,
-    orient_again,
     orient_pairs,
     orient_unchecked,
 )
@@ -31,7 +30,6 @@ from photostrip.strip.relative_orientation.solution import (
     in_front_of_cameras,
     linearised_parallaxes,
     normal_matrices,
-    rays_meet_in_front,
     solve_elements,
     start_values,
     y_parallaxes,
@@ -44,14 +42,13 @@ from tests.strips import (
     batch,
     control_points,
     fly,
-    gruber,
     measured,
     photograph,
     project,
     relative_geometry,
     true_pairs,
 )
-from tests.vectors import cases, section, vector
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,7 +56,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from photostrip.strip.relative_orientation.orientation import Orientation
-    from photostrip.strip.relative_orientation.pairs import Pairs
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]
@@ -92,22 +88,6 @@ def refusal(observations: PhotoPoints, focal: float = 100.0) -> GeometryError:
     assert "photos 1 and 2" in str(caught.value)
     assert caught.value.photos == BOTH
     return caught.value
-
-
-def single(observations: PhotoPoints, focal: float) -> Pairs:
-    return collect_pairs(observations, observations.photo_ids, focal)
-
-
-def test_a_few_points_of_pairs_are_the_same_ones_in_all_pairs_that_have_them() -> None:
-    photos = {
-        photo: {f"p{k}": [0.1 * k, 0.2 * k] for k in range(count)} for photo, count in (("1", 90), ("2", 90), ("3", 8))
-    }
-    pairs = collect_pairs(measured(photos), tuple(photos), 100.0)
-    some = pairs.some_points(20)
-    chosen = [set(pairs.point[pairs.pair == number].tolist()) & set(some.tolist()) for number in range(2)]
-    assert len(chosen[1]) == 8
-    assert 20 <= len(chosen[0]) == len(some) < 28
-    assert pairs.some_points(90).tolist() == sorted(set(pairs.point.tolist()))
 
 
 # ------------------------------------------------------------------------------------------- published
@@ -174,11 +154,6 @@ def test_the_degenerate_examples_are_refused(example: Vector) -> None:
     assert np.linalg.matrix_rank(jacobian) == example.expected["rank_at_zero_elements"]
 
 
-def test_all_examples_are_here() -> None:
-    assert len(section("relative_orientation_exact")) == 3
-    assert len(section("relative_orientation_adjusted")) == 6
-
-
 # --------------------------------------------------------------------------------------- other routes
 
 
@@ -210,19 +185,6 @@ def test_an_optimiser_over_base_and_rotation_finds_the_same(seed: int) -> None:
     assert np.allclose(own_rotation, rotation, rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_essential_matrix_is_that_of_eight_points(seed: int) -> None:
-    truth = true_pairs(np.random.default_rng(seed), counts=(3,) * 6)
-    base, rotation = truth.orient().relative
-    rays = [np.column_stack([side / 153.0, -np.ones(18)]) for side in (truth.pairs.left, truth.pairs.right)]
-    _, _, vt = np.linalg.svd(np.einsum("ni,nj->nij", *rays).reshape(18, 9))
-    theirs = vt[-1].reshape(3, 3)
-    x, y, z = base[0]
-    ours = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ rotation[0]
-    theirs *= np.sign((theirs * ours).sum()) / np.linalg.norm(theirs)
-    assert np.allclose(ours / np.linalg.norm(ours), theirs, rtol=0, atol=1e-9)
-
-
 @given(SEEDS, ELEMENTS)
 def test_derivatives_are_differences(seed: int, elements: tuple[float, ...]) -> None:
     pairs = true_pairs(np.random.default_rng(seed), tilt_deg=3.0, kappa_deg=5.0).pairs
@@ -234,15 +196,6 @@ def test_derivatives_are_differences(seed: int, elements: tuple[float, ...]) -> 
         change[number] = step
         difference = (y_parallaxes(at + change, pairs) - y_parallaxes(at - change, pairs)) / (2 * step)
         assert np.allclose(jacobian[number], difference, rtol=1e-5, atol=1e-5 * np.abs(jacobian[number]).max() + 1e-4)
-
-
-def test_the_row_at_zero_elements_is_the_printed_one() -> None:
-    left = np.array([[3.0, -7.0], [70.0, 65.0], [68.0, -60.0], [5.0, 66.0], [40.0, 1.0]])
-    right, f = left - [69.0, 0.3], 100.0
-    q, jacobian = linearised_parallaxes(np.zeros((1, 5)), batch(left[None], right[None], f))
-    (x1, y1), (x2, y2) = left.T, right.T
-    assert np.allclose(q, y1 - y2, rtol=0, atol=1e-12)
-    assert np.allclose(jacobian, [x1 * y1 / f, x1, -x2 * y2 / f, -(f + y2**2 / f), -x2], rtol=0, atol=1e-12)
 
 
 # ----------------------------------------------------------------------------------------- convergence
@@ -269,18 +222,6 @@ def test_a_pair_without_noise_is_exact(seed: int, kappa: float) -> None:
     assert found.sigma0[0] < 1e-10
 
 
-def test_five_points_have_no_check() -> None:
-    left = np.array([[0, 0], [70, 0], [0, 65], [70, 65], [0, -65]], float)
-    ground = np.column_stack([left, np.full(5, -100.0)]) * np.array([1.0, 1.05, 0.97, 1.02, 1.01])[:, None]
-    rotation = attitude([0.5, -1.0, 2.0])[0]
-    found = orient(of_arrays(left, photograph(ground, np.array([70.0, 1, -1]), rotation, 100.0)), 100.0)
-    assert np.allclose(found.relative[1][0], rotation, rtol=0, atol=1e-10)
-    assert found.points_used.tolist() == [5]
-    assert np.isnan(found.sigma0).all()
-    assert np.isnan(found.sigmas).all()
-    assert np.abs(found.redundancy).max() < 1e-9
-
-
 # -------------------------------------------------------------------------------------------- with noise
 
 
@@ -301,100 +242,7 @@ def test_sigma0_and_sigmas_are_those_of_the_errors() -> None:
     assert np.all((standardised > 0.75) & (standardised < 1.33))  # a variance from 400 is known to 7 percent
 
 
-@pytest.mark.slow
-@given(SEEDS)
-def test_redundancy_numbers_sum_to_the_redundancy(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    truth = true_pairs(rng, 3, sigma=5 * MICROMETRE)
-    weight = rng.uniform(0.2, 3, 36)
-    weight[[4, 17]] = 0
-    pairs = replace(truth.pairs, weight=weight)
-    elements, _, steps = solve_elements(pairs)
-    found = assess_pairs(elements, pairs, steps)
-    totals = [np.nansum(found.redundancy[pairs.pair == number]) for number in range(3)]
-    assert np.allclose(totals, found.points_used - 5, rtol=0, atol=1e-8)
-    assert np.isnan(found.redundancy[[4, 17]]).all()
-    assert np.nanmin(found.redundancy) > -1e-9
-    assert np.nanmax(found.redundancy) < 1
-
-
-def test_six_points_check_the_corners_hardly() -> None:
-    left = np.array([[0, 0], [70, 0], [0, 65], [70, 65], [0, -65], [70, -65]], float)
-    found = orient(of_arrays(left, left - [70.0, 0]), 100.0)
-    assert np.allclose(found.redundancy, [1 / 3, 1 / 3, *[1 / 12] * 4], rtol=0, atol=1e-9)
-
-
-# ------------------------------------------------------------------------------------------- invariants
-
-
-@pytest.mark.slow
-@given(SEEDS)
-def test_the_order_of_the_points_does_not_matter(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    pairs = true_pairs(rng, sigma=5 * MICROMETRE, tilt_deg=3.0).pairs
-    order = rng.permutation(12)
-    one = orient(of_arrays(pairs.left, pairs.right), 153.0)
-    two = orient(of_arrays(pairs.left[order], pairs.right[order]), 153.0)
-    assert np.allclose(one.elements, two.elements, rtol=0, atol=1e-12)
-    assert np.allclose(one.parallax[order], two.parallax, rtol=0, atol=1e-9)
-
-
-@pytest.mark.slow
-@given(SEEDS, st.floats(-170, 170))
-def test_turning_both_photos_in_their_planes_turns_both_kappas(seed: int, turn_deg: float) -> None:
-    pairs = true_pairs(np.random.default_rng(seed), sigma=5 * MICROMETRE, tilt_deg=3.0).pairs
-    turn = np.radians(turn_deg)
-    plane = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])  # the axes turn, the points stay
-    one = orient(of_arrays(pairs.left, pairs.right), 153.0).elements[0]
-    two = orient(of_arrays(pairs.left @ plane.T, pairs.right @ plane.T), 153.0).elements[0]
-    difference = (two - one - [0, turn, 0, 0, turn] + np.pi) % (2 * np.pi) - np.pi
-    assert np.abs(difference).max() < 1e-10
-
-
-@pytest.mark.slow
-@given(SEEDS, st.floats(0.01, 100))
-def test_enlarging_the_photos_changes_lengths_only(seed: int, size: float) -> None:
-    pairs = true_pairs(np.random.default_rng(seed), sigma=5 * MICROMETRE, tilt_deg=3.0).pairs
-    one = orient(of_arrays(pairs.left, pairs.right), 153.0)
-    two = orient(of_arrays(pairs.left * size, pairs.right * size), 153.0 * size)
-    assert np.allclose(one.elements, two.elements, rtol=0, atol=1e-11)
-    assert np.allclose(one.parallax * size, two.parallax, rtol=0, atol=1e-9 * size)
-    assert two.sigma0[0] == pytest.approx(one.sigma0[0] * size, rel=1e-6)
-    assert np.allclose(one.sigmas, two.sigmas, rtol=1e-6, atol=0)
-
-
-def test_many_pairs_at_once_are_what_each_is_alone() -> None:
-    truth = true_pairs(np.random.default_rng(3), 40, sigma=5 * MICROMETRE, tilt_deg=8.0)
-    together = truth.orient()
-    for number in (0, 17, 39):
-        part = truth.pairs.take(np.array([number]))
-        elements, _, steps = solve_elements(part)
-        alone = assess_pairs(elements, part, steps)
-        assert np.allclose(alone.elements[0], together.elements[number], rtol=0, atol=1e-13)
-        assert np.allclose(
-            alone.parallax, together.parallax[together.pairs.rows_of(np.array([number]))], rtol=0, atol=1e-11
-        )
-        assert alone.condition[0] == pytest.approx(together.condition[number], rel=1e-6)
-
-
 # ------------------------------------------------------------------------------------ pairs of a strip
-
-
-def test_pairs_are_collected_in_flight_order() -> None:
-    flown = fly(2, 4, extra=5)
-    pairs = collect_pairs(flown.observations, flown.photos, flown.focal)
-    obs = flown.observations
-    point, rows = pairs.point, pairs.rows
-    assert pairs.size == 3
-    assert np.array_equal(obs.point[rows[:, 0]], point)
-    assert np.array_equal(obs.point[rows[:, 1]], point)
-    assert np.array_equal(obs.photo[rows[:, 0]], pairs.pair)
-    assert np.array_equal(obs.photo[rows[:, 1]], pairs.pair + 1)
-    assert np.array_equal(pairs.left, obs.xy[rows[:, 0]])
-    for number in range(3):
-        both = set(obs.point[obs.photo == number]) & set(obs.point[obs.photo == number + 1])
-        assert set(point[pairs.pair == number]) == both
-    assert np.allclose(pairs.weight, 1)
 
 
 @pytest.mark.parametrize("kappa", [0.0, 90.0, 180.0, 30.0])
@@ -415,68 +263,7 @@ def test_a_y_parallax_has_the_variance_across_the_base(sigma: tuple[float, float
     assert pairs.weight == pytest.approx((np.median(sigma) / across) ** 2, rel=0.25)
 
 
-def test_rows_in_any_order_and_other_photos_do_not_matter() -> None:
-    flown = fly(2, 4, extra=5)
-    obs, order = flown.observations, np.random.default_rng(1).permutation(len(flown.observations))
-    shuffled = PhotoPoints(
-        obs.photo_ids, obs.point_ids, obs.photo[order], obs.point[order], obs.xy[order], obs.sigma[order]
-    )
-    whole = flown.oriented().elements
-    pairs = collect_pairs(shuffled, flown.photos, flown.focal)
-    assert np.allclose(orient_pairs(pairs, flown.photos).elements, whole, rtol=0, atol=1e-13)
-    middle = flown.photos[1:3]
-    pairs = collect_pairs(obs, middle, flown.focal)
-    assert np.allclose(orient_pairs(pairs, middle).elements, whole[1:2], rtol=0, atol=1e-13)
-
-
-def test_weights_come_from_the_standard_deviations() -> None:
-    observations = of_arrays(np.eye(6, 2), np.eye(6, 2) - 70)
-    sigma = np.full((12, 2), 0.005)
-    sigma[3] = 0.010  # the left image point of p3
-    pairs = single(replace(observations, sigma=sigma), 100.0)
-    assert np.allclose(np.delete(pairs.weight, 3), 1)
-    assert pairs.weight[3] == pytest.approx(2 / (1 + 4))  # of a difference of two coordinates
-
-
-def test_a_point_of_no_weight_does_not_count() -> None:
-    pairs = true_pairs(
-        np.random.default_rng(5), sigma=5 * MICROMETRE, counts=(3,) * 6, tilt_deg=3.0, kappa_deg=0.0
-    ).pairs
-    everything = of_arrays(pairs.left, pairs.right)
-    bad = pairs.left.copy()
-    bad[4] += [0.0, 3.0]
-    oriented = orient(of_arrays(bad, pairs.right), 153.0)
-    weight = oriented.pairs.weight.copy()
-    weight[4] = 0
-    without = orient_again(oriented, weight, np.array([0]))
-    rest = np.delete(np.arange(18), 4)
-    alone = orient(of_arrays(pairs.left[rest], pairs.right[rest]), 153.0)
-    assert np.allclose(without.elements, alone.elements, rtol=0, atol=1e-11)
-    assert np.allclose(without.sigma0, alone.sigma0, rtol=1e-6)
-    assert np.allclose(without.redundancy[rest], alone.redundancy, rtol=0, atol=1e-6)
-    assert without.points_used.tolist() == [17]
-    assert abs(without.parallax[4]) > 2.5  # still told, with its whole error
-    assert np.abs(orient(everything, 153.0).parallax).max() < 0.03
-
-
 # --------------------------------------------------------------------------------------------- weak pairs
-
-
-@pytest.mark.parametrize(
-    ("left", "condition"),
-    [
-        ([[0, 0], [70, 0], [0, 65], [70, 65], [0, -65], [70, -65]], 13),
-        ([[0, 0], [70, 0], [0, 65], [70, 65], [0, -65]], 17),
-        ([[0, 0], [70, 0], [0, 10], [70, 10], [0, -10], [70, -10]], 430),
-    ],
-    ids=["six standard points", "five of them", "a band of 20 mm"],
-)
-def test_condition_numbers(left: list[list[float]], condition: float) -> None:
-    found = orient(of_arrays(left, np.array(left, float) - [70, 0]), 100.0)
-    assert found.condition[0] == pytest.approx(condition, rel=0.04)
-    _, jacobian = linearised_parallaxes(found.elements, found.pairs)
-    columns = jacobian.T / np.linalg.norm(jacobian, axis=1)
-    assert found.condition[0] == pytest.approx(np.linalg.cond(columns), rel=1e-6)
 
 
 def test_a_hair_band_is_refused() -> None:
@@ -535,47 +322,11 @@ def test_a_pair_on_a_narrow_band_is_warned_of() -> None:
 # ---------------------------------------------------------------------------------------------- refused
 
 
-@pytest.mark.parametrize("common", [0, 1, 4])
-def test_fewer_than_five_common_points(common: int) -> None:
-    pairs = true_pairs(np.random.default_rng(1)).pairs
-    error = refusal(of_arrays(pairs.left[:common], pairs.right[:common]))
-    assert error.code == "too-few-common-points"
-    assert f"{counted(common, 'common point')}, at least 5 are necessary" in str(error)
-    assert "order of the photos" in str(error)
-
-
 def test_the_pair_with_too_few_points_is_the_one_named() -> None:
     flown = fly(1, 6)
     wrong_order = (*flown.photos[:2], flown.photos[4], flown.photos[3], *flown.photos[5:])
     with pytest.raises(GeometryError, match="photos 102 and 105: 0 common points"):
         collect_pairs(flown.observations, wrong_order, flown.focal)
-
-
-def test_one_column_of_points() -> None:
-    y = np.linspace(-65, 65, 8)
-    left = np.column_stack([np.zeros(8), y])
-    error = refusal(of_arrays(left, left - np.column_stack([70 + y**2 / 500, 0 * y])))
-    assert error.code == "points-on-a-line"
-
-
-def test_a_line_of_points_across_the_photo() -> None:
-    line = np.linspace(0, 1, 9)[:, None] * [80.0, 60.0]
-    assert refusal(of_arrays(line, line - [70, 0])).code == "points-on-a-line"
-
-
-def test_the_same_photo_twice() -> None:
-    left = true_pairs(np.random.default_rng(1)).pairs.left
-    error = refusal(of_arrays(left, left), 153.0)
-    assert error.code == "no-base"
-    assert "the same photo twice" in str(error)
-
-
-@pytest.mark.slow
-def test_points_that_are_not_the_same() -> None:
-    rng = np.random.default_rng(4)
-    for _ in range(5):
-        error = refusal(of_arrays(rng.uniform(-100, 100, (12, 2)), rng.uniform(-100, 100, (12, 2))), 153.0)
-        assert error.code in {"not-converged", "behind-cameras"}
 
 
 @pytest.mark.parametrize("mirror", [[-1, 1], [1, -1]], ids=["x", "y"])
@@ -587,48 +338,6 @@ def test_a_mirrored_photo(mirror: list[int]) -> None:
     assert "mirrored" in str(error)
 
 
-def test_photos_turned_by_half_a_turn_are_no_fault() -> None:
-    pairs = true_pairs(np.random.default_rng(1)).pairs
-    one, two = orient(of_arrays(pairs.left, pairs.right), 153.0), orient(of_arrays(-pairs.left, -pairs.right), 153.0)
-    turned = (two.elements - one.elements) / np.pi
-    assert np.allclose(np.abs(turned), [[0, 1, 0, 0, 1]], rtol=0, atol=1e-10)
-
-
-def test_the_refused_pair_of_a_strip_is_the_one_named() -> None:
-    flown = fly(3, 5, extra=20)
-    xy = flown.observations.xy.copy()
-    third = flown.observations.photo == 3
-    xy[third] = np.random.default_rng(1).permutation(xy[third])
-    with pytest.raises(GeometryError) as caught:
-        orient(replace(flown.observations, xy=xy), flown.focal)
-    assert caught.value.photos == ("103", "104")  # the first of the two pairs that photo 104 spoils
-
-
-def test_what_an_example_says_of_its_rank() -> None:
-    ranks = [
-        vector(f"ro-degenerate-{name}").expected["rank_at_zero_elements"] for name in ("line-y=0", "one-column-x=0")
-    ]
-    assert ranks == [2, 3]
-
-
-def test_standard_points_lie_where_they_should() -> None:
-    exact = gruber(np.random.default_rng(0), 1, a=65, b=70, counts=(1,) * 6, scatter=0.0)[0]
-    assert exact.tolist() == [[0, 0], [70, 0], [0, 65], [70, 65], [0, -65], [70, -65]]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("tilt", "share"), [(15.0, 1.0), (20.0, 0.995)])
-def test_large_tilts_come_back_too(tilt: float, share: float) -> None:
-    for seed in range(3):
-        truth = true_pairs(np.random.default_rng(seed), 1000, tilt_deg=tilt)
-        elements, converged, _ = solve_elements(truth.pairs)
-        right = truth.errors(elements) < 1e-9
-        assert right.mean() >= share
-        assert (
-            not (converged & ~right).any() or (converged & ~right).mean() < 0.002
-        )  # hardly one is wrong and looks right
-
-
 def test_the_same_photo_measured_twice() -> None:
     """Noise makes a pair of it that converges; it has no base all the same."""
     rng = np.random.default_rng(1)
@@ -636,10 +345,3 @@ def test_the_same_photo_measured_twice() -> None:
     error = refusal(of_arrays(left, left + rng.normal(0, 5 * MICROMETRE, left.shape)), 153.0)
     assert error.code == "no-base"
     assert "the same photo twice" in str(error)
-
-
-@pytest.mark.parametrize(("to_left", "front"), [(1e-3, True), (0.0, False), (-1e-3, False)])
-def test_rays_that_meet_at_a_camera_do_not_meet_in_front_of_it(*, to_left: float, front: bool) -> None:
-    """The left ray looks down from (0, 0, 0); the right one from (1, 0, 0) meets it at the height -to_left."""
-    left, right = np.array([[0.0], [0.0], [-1.0]]), np.array([[-1.0], [0.0], [-to_left]])
-    assert rays_meet_in_front(left, right).tolist() == [front]

@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
-from photostrip.strip.relative_orientation import six_points
-from photostrip.strip.relative_orientation.solution import solve_elements
+from photostrip.strip.relative_orientation import standard_points
 from tests.loops import nonempty
-from tests.strips import attitude, batch
-from tests.vectors import cases, section
+from tests.strips import attitude
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LENGTHS = st.floats(40.0, 300.0)
-SMALL = st.floats(-0.02, 0.02)
-TILTS = st.floats(-0.6, 0.6)
-KAPPAS = st.floats(-np.pi, np.pi)
 
 
 SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
@@ -60,16 +56,6 @@ def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: flo
     )
 
 
-def standard_points(width: float, base: float) -> Floats:
-    return np.array([[0, 0], [base, 0], [0, width], [base, width], [0, -width], [base, -width]])
-
-
-def design(left: Floats, focal: float, base: float) -> Floats:
-    """Derivatives of the y parallaxes at zero elements, written down from the condition."""
-    (x1, y), x2 = left.T, left[:, 0] - base
-    return np.column_stack([x1 * y / focal, x1, -x2 * y / focal, -(focal + y**2 / focal), -x2])
-
-
 def dependent_pair(elements: ArrayLike) -> tuple[Floats, Floats]:
     """Direction of the base and rotation of the right photo in the left photo's frame, from base-frame elements; exact.
 
@@ -100,9 +86,9 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
     assert found.closing_error == pytest.approx(expected["closing_W"], rel=rel)
     assert found.sigma == pytest.approx(expected["m_q"], rel=rel)
     assert np.allclose(found.residuals, expected["residuals"], rtol=rel, atol=0)
-    q = six_points.cofactors(f, a, b)
+    q = standard_points.cofactors(f, a, b)
     assert np.allclose(q, expected["cofactor"], rtol=rel, atol=1e-18)
-    t = six_points.dependent_from_base(b)
+    t = standard_points.dependent_from_base(b)
     dependent = t @ q @ t.T
     formulas = expected["cofactor_formulas"]
     values = {
@@ -135,28 +121,11 @@ def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     assert np.allclose(base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
 
 
-def test_all_examples_are_here() -> None:
-    assert [len(section(name)) for name in ("gruber_six_points", "base_chain")] == [2, 2]
-
-
-@given(LENGTHS, LENGTHS, LENGTHS, st.lists(st.floats(-1, 1), min_size=6, max_size=6))
-def test_the_closed_forms_are_the_linear_least_squares(f: float, a: float, b: float, q: list[float]) -> None:
-    jacobian = design(standard_points(a, b), f, b)
-    found = orient_six_points(q, f, a, b)
-    solution, *_ = np.linalg.lstsq(jacobian, -np.array(q), rcond=None)
-    size = np.abs(solution).max() + 1e-12
-    assert np.allclose(found.elements, solution, rtol=0, atol=1e-9 * size)
-    assert np.allclose(found.residuals, np.array(q) + jacobian @ solution, rtol=0, atol=1e-9)
-    assert found.sigma == pytest.approx(np.linalg.norm(found.residuals), abs=1e-9)
-    inverse = np.linalg.inv(jacobian.T @ jacobian)
-    assert np.allclose(six_points.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
-
-
 @given(LENGTHS, LENGTHS)
 def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
     f = 153.0
-    t = six_points.dependent_from_base(b)
-    found = t @ six_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
+    t = standard_points.dependent_from_base(b)
+    found = t @ standard_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
     expected = np.zeros((5, 5))
     np.fill_diagonal(
         expected,
@@ -173,48 +142,3 @@ def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
     expected[0, 4] = expected[4, 0] = -f * (2 * a**2 + 3 * f**2) / (4 * a**4)
     scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
     assert np.allclose(found / scale, expected / scale, rtol=0, atol=1e-9)
-
-
-@given(st.tuples(SMALL, SMALL, SMALL, SMALL, SMALL))
-def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
-    f, a, b = 150.0, 90.0, 90.0
-    left = standard_points(a, b)
-    right = left - [b, 0]
-    q = -design(left, f, b) @ np.array(elements)
-    pairs = batch(left[None], (right - np.column_stack([np.zeros(6), q]))[None], f)
-    rigorous, converged, _ = solve_elements(pairs)
-    assert converged.all()
-    linear = orient_six_points(q, f, a, b).elements
-    assert np.allclose(linear, elements, rtol=0, atol=1e-12)
-    assert (
-        np.abs(rigorous[0] - linear).max() < 10 * np.abs(elements).max() ** 2 + 1e-9
-    )  # what is left is of second order
-
-
-@given(st.tuples(TILTS, KAPPAS, TILTS, TILTS, KAPPAS))
-def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
-    direction, rotation = dependent_pair(elements)
-    again = base_elements(direction * 7.0, rotation)
-    difference = (again - elements + np.pi) % (2 * np.pi) - np.pi
-    assert np.abs(difference).max() < 1e-13
-    assert np.linalg.norm(direction) == pytest.approx(1, abs=1e-15)
-
-
-def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
-    b, step = 92.0, 1e-5
-    t = six_points.dependent_from_base(b)
-    for number in range(5):
-        elements = np.zeros(5)
-        elements[number] = step
-        direction, rotation = dependent_pair(elements)
-        dalpha, domega, dkappa = alpha_omega_kappa(rotation)
-        found = [b * direction[1] / direction[0], b * direction[2] / direction[0], dkappa, dalpha, domega]
-        assert np.allclose(found, t[:, number] * step, rtol=0, atol=1e-7 * step * b)
-
-
-def test_many_pairs_at_once() -> None:
-    elements = np.random.default_rng(1).uniform(-0.3, 0.3, (4, 3, 5))
-    direction, rotation = dependent_pair(elements)
-    assert direction.shape == (4, 3, 3)
-    assert rotation.shape == (4, 3, 3, 3)
-    assert np.allclose(base_elements(direction, rotation), elements, rtol=0, atol=1e-14)

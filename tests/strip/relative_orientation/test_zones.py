@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from photostrip.strip.relative_orientation.zones import Support, zones
+from photostrip.strip.relative_orientation.standard_points import Support, zones
 from tests.strips import true_pairs
 
 if TYPE_CHECKING:
@@ -28,15 +27,6 @@ def test_points_around_the_standard_positions_have_their_zones(counts: Sequence[
     oriented = flown.orient()
     found = zones(oriented.elements, oriented.pairs).reshape(50, -1)
     assert (found == zone_of(counts)).mean() > 0.995
-
-
-def test_a_rejected_point_has_a_zone_and_moves_no_other() -> None:
-    flown = true_pairs(np.random.default_rng(2), counts=(2,) * 6)
-    oriented = flown.orient()
-    weight = oriented.pairs.weight.copy()
-    weight[0] = 0.0
-    without = replace(oriented.pairs, weight=weight)
-    assert zones(oriented.elements, without).tolist() == zone_of((2,) * 6).tolist()
 
 
 @pytest.mark.parametrize(

@@ -7,22 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings as examples
-from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
-from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
-from photostrip.statistics import normal_quantile
-from photostrip.strip.relative_orientation.orientation import Orientation, orient_again, orient_pairs
+from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.strip_formation.scale_transfer import (
     SCALE_TRANSFERS,
     StripFormationSettings,
-    contradictions,
     mean_ratios,
     transfer_scale,
 )
@@ -32,11 +25,10 @@ from photostrip.strip.strip_formation.strip import (
     _refuse_vertical_base,
     form_from_pairs,
     hand_on_rotations,
-    mean_points,
 )
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
-from tests.vectors import cases, section
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -156,61 +148,6 @@ def test_the_strip_of_the_formula_book_in_its_own_frame(example: Vector) -> None
         assert np.allclose(xyz, expected, rtol=0, atol=tol["coords"])
 
 
-FIRST = FirstPhoto(Rotation.from_euler("YXZ", [-4, 3, 25], degrees=True).as_matrix(), 92.0)
-
-
-def test_what_is_given_of_the_first_photo_turns_and_scales_the_strip() -> None:
-    flown = fly(5, 5, sigma=5 * MICROMETRE, extra=12)
-    oriented, settings = flown.oriented(), StripFormationSettings()
-    usual = form_from_pairs(oriented, settings, flown.photos)
-    given_ = form_from_pairs(oriented, settings, flown.photos, first=FIRST)
-    assert np.allclose(given_.centers, 92 * usual.centers @ FIRST.rotation.T, rtol=0, atol=1e-10)
-    assert np.allclose(given_.xyz, 92 * usual.xyz @ FIRST.rotation.T, rtol=0, atol=1e-10)
-    assert np.allclose(given_.rotations, FIRST.rotation @ usual.rotations, rtol=0, atol=1e-13)
-    assert np.allclose(given_.scale_factor, usual.scale_factor, rtol=1e-14)
-    assert np.allclose(np.linalg.norm(np.diff(given_.centers, axis=0), axis=1), given_.scale)
-
-
-def test_points_on_the_left_ray_follow_the_printed_formula() -> None:
-    flown = fly(6, 4, sigma=10 * MICROMETRE, extra=12)
-    oriented = flown.oriented()
-    strip = form_from_pairs(
-        oriented, StripFormationSettings("distances", intersection="left"), flown.photos, first=FIRST
-    )
-    f, pair = oriented.pairs.focal, oriented.pairs.pair
-    for row in nonempty(np.flatnonzero(np.isfinite(strip.model_xyz[:, 0]))[::7].tolist()):
-        at = pair[row]
-        (x1, y1), (x2, _) = (
-            -f * (ray := strip.rotations[photo] @ [*image[row], -f])[:2] / ray[2]
-            for photo, image in ((at, oriented.pairs.left), (at + 1, oriented.pairs.right))
-        )
-        bx, _, bz = strip.centers[at + 1] - strip.centers[at]
-        n = (bx + x2 * bz / f) / (x1 - x2)  # eq. 138
-        expected = strip.centers[at] + [n * x1, n * y1, -n * f]
-        assert np.allclose(strip.model_xyz[row], expected, rtol=0, atol=1e-9)
-    both = form_from_pairs(oriented, StripFormationSettings("distances"), flown.photos, first=FIRST)
-    away = np.linalg.norm(both.model_xyz - strip.model_xyz, axis=1)
-    depth = np.linalg.norm(strip.model_xyz - strip.centers[pair], axis=1)
-    q = np.abs(oriented.parallax) * depth / f
-    # half a y parallax in Y, and, where the frame is turned by 25 degrees, what it does to N
-    assert 0.5 < np.nanmedian(away / np.maximum(q, 1e-12)) < 2.0
-
-
-def test_weights_of_points_are_those_of_the_mean_ratio() -> None:
-    flown = fly(7, 4, sigma=10 * MICROMETRE, extra=12)
-    oriented, settings = flown.oriented(), StripFormationSettings("distances")
-    usual = form_from_pairs(oriented, settings, flown.photos, searched=True).junctions
-    weight = np.random.default_rng(8).choice([0.0, 0.5, 1.0, 2.0], len(flown.observations.point_ids))
-    found = form_from_pairs(oriented, settings, flown.photos, searched=True, point_weight=weight).junctions
-    for junction in nonempty(range(len(usual.factor))):
-        rows = usual.junction == junction
-        expected = np.average(usual.ratio[rows], weights=weight[usual.point[rows]])
-        assert found.factor[junction] == pytest.approx(expected, rel=1e-14)
-        assert set(found.point[found.junction == junction]) == set(usual.point[rows & (weight[usual.point] > 0)])
-    none = form_from_pairs(oriented, settings, flown.photos, searched=True, point_weight=np.zeros(len(weight)))
-    assert np.array_equal(none.junctions.factor, usual.factor)  # a junction keeps what it has
-
-
 def oriented_as(elements: Floats, points: int = 6) -> Orientation:
     """Pairs of given elements; what was measured is not looked at."""
     p = len(elements)
@@ -257,10 +194,6 @@ def test_the_scale_factors_of_the_formula_book(example: Vector) -> None:
     assert np.allclose(center + mean * given_["new_point_increment"], expected["new_point"], rtol=rel, atol=0)
 
 
-def test_all_examples_are_here() -> None:
-    assert [len(section(name)) for name in ("strip_local", "base_chain", "scale_transfer")] == [1, 2, 1]
-
-
 # --------------------------------------------------------------------------------- back to the truth
 
 
@@ -272,69 +205,6 @@ def test_strips_without_noise_close(transfer: str) -> None:
         photos, kappa = int(rng.integers(4, 8)), float(rng.uniform(-180, 180))
         flown = fly(seed, photos, tilt_deg=3, kappa_deg=kappa, relief=0.15, extra=10)
         assert closure(flown, transfer) < CLOSURE
-
-
-@pytest.mark.parametrize("kappa", [0.0, 90.0, 180.0, 270.0])
-def test_photos_may_hang_in_the_camera_in_any_way(kappa: float) -> None:
-    flown = fly(3, 6, kappa_deg=kappa, relief=0.1, extra=5)
-    assert closure(flown) < CLOSURE
-    turned = np.degrees(formed(flown).base_direction)
-    assert np.allclose((turned + kappa + 180) % 360 - 180, 0, atol=6)
-
-
-def test_long_strips_close() -> None:
-    assert closure(fly(3, 120, tilt_deg=3, relief=0.15)) < 1e-11
-
-
-def test_base_angles_scale_and_bases_are_those_of_the_centres() -> None:
-    strip = formed(fly(5, 6, sigma=5 * MICROMETRE, extra=20))
-    bases = np.diff(strip.centers, axis=0)
-    assert np.allclose(strip.scale, np.linalg.norm(bases, axis=1), rtol=1e-12, atol=0)
-    assert np.allclose(strip.base_direction, np.arctan2(bases[:, 1], bases[:, 0]), rtol=0, atol=1e-12)
-    inclination = np.arctan2(bases[:, 2], np.hypot(bases[:, 0], bases[:, 1]))
-    assert np.allclose(strip.base_inclination, inclination, rtol=0, atol=1e-12)
-    assert np.allclose(strip.scale[1:] / strip.scale[:-1], strip.junctions.factor, rtol=1e-12, atol=0)
-    assert np.array_equal(strip.rotations[0], np.eye(3))
-    assert np.array_equal(strip.centers[0], np.zeros(3))
-
-
-def test_orientations_are_handed_on() -> None:
-    turns = Rotation.random(6, random_state=1).as_matrix()
-    chain = hand_on_rotations(turns)
-    assert np.array_equal(chain[0], np.eye(3))
-    for number, turn in nonempty(enumerate(turns)):
-        assert np.allclose(chain[number].T @ chain[number + 1], turn, rtol=0, atol=1e-14)
-
-
-@pytest.mark.slow
-@TRANSFERS
-@examples(max_examples=30)
-@given(size=st.floats(0.01, 100.0))
-def test_the_size_of_the_photos_does_not_matter(transfer: str, size: float) -> None:
-    flown = fly(4, 5, sigma=5 * MICROMETRE, extra=10)
-    larger = replace(flown, observations=replace(flown.observations, xy=flown.observations.xy * size), focal=153 * size)
-    one, two = formed(flown, transfer), formed(larger, transfer)
-    assert np.allclose(one.xyz, two.xyz, rtol=0, atol=1e-9)
-    assert np.allclose(one.centers, two.centers, rtol=0, atol=1e-9)
-
-
-def test_the_scale_of_the_ground_does_not_matter() -> None:
-    """The same photos come from a world of any size: only angles are measured."""
-    small, large = fly(4, 5, scale=1_000), fly(4, 5, scale=100_000)
-    assert np.allclose(small.observations.xy, large.observations.xy, rtol=0, atol=1e-9)
-    assert np.allclose(formed(small).xyz, formed(large).xyz, rtol=0, atol=1e-10)
-
-
-def test_the_strip_flown_back_is_the_same_strip() -> None:
-    flown = fly(6, 5, sigma=5 * MICROMETRE, extra=20)
-    there = formed(flown)
-    pairs = collect_pairs(flown.observations, flown.photos[::-1], flown.focal)
-    back = form_from_pairs(orient_pairs(pairs, flown.photos[::-1]), StripFormationSettings(), flown.photos[::-1])
-    assert np.array_equal(there.point, back.point)
-    similarity = Similarity.from_points(back.xyz, there.xyz)
-    assert (
-        np.abs(similarity.residuals(back.xyz, there.xyz)).max() < 2e-4
-    )  # in bases, as the noise is; not the same sums
 
 
 # ------------------------------------------------------------------------------------------ with noise
@@ -359,19 +229,6 @@ def test_both_transfers_are_equally_good_over_all_common_points(overlap: float) 
     assert least_squares / distances == pytest.approx(1, abs=0.03)
 
 
-@pytest.mark.slow
-def test_the_spread_of_the_ratios_is_that_of_the_parallaxes() -> None:
-    """A ratio of two distances along one ray is known to sqrt(2) sigma_p / p at best, sigma_p = sqrt(2) sigma."""
-    sigma, spreads = 5 * MICROMETRE, []
-    for seed in range(30):
-        flown = fly(seed, 6, sigma=sigma, extra=30)
-        spreads.append(formed(flown).junctions.spread)
-    parallax = flown.focal * flown.base / flown.height
-    expected = 2 * sigma / parallax
-    found = float(np.sqrt(np.mean(np.array(spreads) ** 2)))
-    assert expected < found < 1.5 * expected  # the elements of both pairs have errors, too
-
-
 @TRANSFERS
 @pytest.mark.parametrize("extra", [10, 40, 150], ids=["4 points a joint", "7 points", "18 points"])
 def test_a_wrong_pass_point_is_rejected_and_does_little_harm(transfer: str, extra: int) -> None:
@@ -391,59 +248,7 @@ def test_a_wrong_pass_point_is_rejected_and_does_little_harm(transfer: str, extr
     assert harm.max() < 0.25 * share
 
 
-def test_small_deviations_are_never_rejected() -> None:
-    for seed in range(10):
-        assert formed(fly(seed, 6, sigma=3 * MICROMETRE, extra=20)).junctions.used.all()
-
-
 # ----------------------------------------------------------------------------- points on more or fewer photos
-
-
-def test_points_of_one_and_of_many_models() -> None:
-    flown = fly(9, 6, overlap=0.8, extra=10)
-    strip = formed(flown)
-    obs = flown.observations
-    rows = {int(point): row for row, point in enumerate(strip.point)}
-    for name, number in nonempty(flown.at.items()):
-        on = np.sort(obs.photo[obs.point == number])
-        models = int((np.diff(on) == 1).sum())
-        if models:
-            assert strip.model_count[rows[number]] == models, name
-        else:
-            assert number not in rows, name
-    assert len(set(strip.model_count)) >= 3
-
-
-def test_a_point_on_photos_one_and_three_only_has_no_coordinates() -> None:
-    flown = fly(9, 4, extra=10)
-    keep = ~seen(flown, 1, "p1_0")
-    assert seen(flown, 0, "p1_0").any()
-    assert seen(flown, 2, "p1_0").any()
-    less = replace(flown, observations=only(flown.observations, keep))
-    strip = formed(less)
-    assert flown.at["p1_0"] not in strip.point
-    assert closure(less) < CLOSURE
-
-
-def test_a_point_of_a_single_model_is_what_its_model_says() -> None:
-    flown = fly(9, 4, sigma=5 * MICROMETRE, extra=10)
-    less = replace(flown, observations=only(flown.observations, ~seen(flown, 2, "p1_0")))
-    strip = formed(less)
-    row = int(np.flatnonzero(strip.point == flown.at["p1_0"])[0])
-    assert strip.model_count[row] == 1
-    oriented = less.oriented()
-    inside = np.flatnonzero(oriented.point == flown.at["p1_0"])
-    assert oriented.pairs.pair[inside].tolist() == [0]
-    assert np.array_equal(strip.xyz[row], strip.model_xyz[inside[0]])
-
-
-def test_coordinates_are_means_over_the_models() -> None:
-    flown = fly(10, 6, sigma=5 * MICROMETRE, extra=10)
-    strip, oriented = formed(flown), flown.oriented()
-    for row, number in nonempty(enumerate(strip.point)):
-        models = strip.model_xyz[oriented.point == number]
-        assert np.allclose(strip.xyz[row], models.mean(axis=0), rtol=0, atol=1e-12)
-        assert strip.model_count[row] == len(models)
 
 
 @pytest.mark.parametrize(("kept", "renamed"), [("p4_0", "p20_1"), ("p4_1", "p23_0")])
@@ -459,43 +264,6 @@ def test_of_two_points_under_one_id_that_lie_far_apart_the_one_in_more_models_st
     assert strip.xyz[row] == pytest.approx(before.xyz[before.point == stays][0], abs=1e-9)
     assert other not in strip.point
     assert np.isnan(strip.model_xyz).any(axis=1).sum() == min(model.values())
-
-
-def test_a_point_that_is_missing_on_photos_in_between_is_one_point() -> None:
-    flown = fly(9, 12, overlap=0.9, sigma=5 * MICROMETRE, extra=30)
-    on = np.sort(flown.observations.photo[flown.observations.point == flown.at["p5_0"]])
-    gone = np.isin(flown.observations.photo, on[2:-2]) & (flown.observations.point == flown.at["p5_0"])
-    assert gone.sum() >= 2
-    strip = formed(replace(flown, observations=only(flown.observations, ~gone)))
-    assert strip.model_count[strip.point == flown.at["p5_0"]] == 2
-    assert np.isfinite(strip.model_xyz).all()
-
-
-@given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=20))
-def test_means_by_hand(rows: list[tuple[int, bool]]) -> None:
-    point = np.array([number for number, _ in rows], int)
-    use = np.array([flag for _, flag in rows], bool)
-    xyz = np.random.default_rng(1).normal(0, 1, (len(rows), 3))
-    numbers, mean, count = mean_points(point, xyz, use)
-    assert numbers.tolist() == sorted(set(point[use]))
-    given = [xyz[use & (point == number)] for number in numbers]
-    np.testing.assert_allclose(mean, [own.mean(axis=0) for own in given] or np.empty((0, 3)))
-    assert count.tolist() == [len(own) for own in given]
-
-
-def test_a_rejected_point_joins_nothing_and_makes_no_mean() -> None:
-    flown = fly(10, 4, extra=10)
-    oriented = flown.oriented()
-    weight = oriented.pairs.weight.copy()
-    out = (oriented.point == flown.at["p1_0"]) & (oriented.pairs.pair == 0)
-    weight[out] = 0
-    without = orient_again(oriented, weight, np.array([0]))
-    strip = form_from_pairs(without, StripFormationSettings(), flown.photos)
-    row = int(np.flatnonzero(strip.point == flown.at["p1_0"])[0])
-    assert strip.model_count[row] == 1
-    at_first = strip.junctions.point[strip.junctions.junction == 0]
-    assert flown.at["p1_0"] not in at_first
-    assert np.isfinite(strip.model_xyz[out]).all()  # where it would be is still told
 
 
 # ---------------------------------------------------------------------------------------------- refused
@@ -515,17 +283,6 @@ def test_a_broken_joint_names_its_three_photos() -> None:
     assert error.photos == ("103", "104", "105")
     assert "no point is common to photos 103, 104 and 105" in str(error)
     assert "at least one pass point" in str(error)
-
-
-def test_one_pass_point_joins_and_its_spread_is_unknown() -> None:
-    flown = fly(11, 4, extra=30)
-    obs = flown.observations
-    common = sorted(set(obs.point[obs.photo == 1]) & set(obs.point[obs.photo == 2]) & set(obs.point[obs.photo == 3]))
-    less = replace(flown, observations=only(obs, ~(np.isin(obs.point, common[1:]) & (obs.photo == 3))))
-    strip = formed(less)
-    assert np.isnan(strip.junctions.spread[1])
-    assert np.isfinite(strip.junctions.spread[0])
-    assert closure(less) < CLOSURE
 
 
 def test_a_base_along_the_view_is_refused() -> None:
@@ -551,57 +308,3 @@ def test_the_steep_base_is_named() -> None:
         _refuse_vertical_base(upright, ("1", "2", "3"))
     assert caught.value.code == "vertical-base"
     assert caught.value.photos == ("2", "3")
-
-
-# ------------------------------------------------------------------------------------------ ratios far from the others
-
-
-def test_a_wrong_ratio_among_three_does_not_reach_the_scale() -> None:
-    ratio = np.array([1.0001, 1.0, 1.01, 1.0, 1.0001])
-    far, limit = contradictions(ratio, np.ones(5), np.full(5, 2e-4), np.array([0, 0, 0, 1, 1]), 2)
-    assert far.tolist() == [False, False, True, False, False]
-    assert limit == pytest.approx(normal_quantile(1 - 0.01 / 10) * 2e-4)  # 1 % of a strip, five ratios, two sides
-
-
-def test_of_two_ratios_none_is_far() -> None:
-    far, _ = contradictions(np.array([1.0, 1.1]), np.ones(2), np.full(2, 1e-4), np.zeros(2, int), 1)
-    assert not far.any()
-
-
-def test_ratios_may_scatter_more_than_their_own_coordinates_do() -> None:
-    rng = np.random.default_rng(1)
-    junction = np.repeat(np.arange(20), 8)
-    ratio = np.exp(rng.normal(0, 4e-4, 160))
-    far, limit = contradictions(ratio, np.ones(160), np.full(160, 2e-4), junction, 20)
-    assert far.sum() <= 1
-    assert limit == pytest.approx(normal_quantile(1 - 0.01 / 320) * 4e-4, rel=0.15)
-
-
-def test_without_ratios_nothing_is_far() -> None:
-    far, limit = contradictions(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, int), 0)
-    assert (len(far), len(limit)) == (0, 0)
-
-
-def test_after_a_search_of_the_rays_every_pass_point_counts() -> None:
-    flown = fly(8, 5, sigma=2 * MICROMETRE, extra=40, tilt_deg=0.2)
-    xy = flown.observations.xy.copy()
-    xy[np.flatnonzero(seen(flown, 3, "p2_1")), 0] += 1.0
-    oriented = replace(flown, observations=replace(flown.observations, xy=xy)).oriented()
-    before, after = (
-        form_from_pairs(oriented, StripFormationSettings(), flown.photos, searched=searched).junctions
-        for searched in (False, True)
-    )
-    assert not before.used.all()
-    assert after.used.all()
-    assert np.array_equal(before.limit, after.limit)
-    total = np.bincount(after.junction, after.weight)
-    assert after.factor == pytest.approx(np.bincount(after.junction, after.weight * after.ratio) / total)
-
-
-def test_the_scatter_of_pairs_without_noise_is_a_micrometre() -> None:
-    flown = fly(12, 4, sigma=0.0, extra=30)
-    limit = formed(flown).junctions.limit
-    given = np.full(3, 1e-3)
-    assert np.array_equal(
-        limit, form_from_pairs(flown.oriented(), StripFormationSettings(), flown.photos, given).junctions.limit
-    )

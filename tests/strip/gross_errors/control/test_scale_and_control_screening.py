@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +10,8 @@ import pytest
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.method import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
-from photostrip.result.document import document_of
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -63,12 +61,6 @@ def test_a_wrong_coordinate_is_found_and_its_size_estimated(error: tuple[float, 
     assert [note.points for note in result.notes if note.code == "control-rejected"] == [("p6_1",)]
 
 
-def test_a_wrong_height_leaves_the_plan_position_in_use() -> None:
-    strip = adjusted(flown(), {"p6_1": (0.0, 0.0, 8.0)}).strips[0]
-    row = strip.control.ids.index("p6_1")
-    assert strip.control.use[row].tolist() == [True, True, False]
-
-
 @pytest.mark.slow
 def test_exchanged_points_are_named_as_an_exchange() -> None:
     strip = flown()
@@ -77,43 +69,6 @@ def test_exchanged_points_are_named_as_an_exchange() -> None:
     ids = found.control.ids
     assert {each.cause for each in found.wrong_control} == {"exchanged"}
     assert {ids[each.row]: ids[each.other] for each in found.wrong_control} == {"p6_1": "p9_-1", "p9_-1": "p6_1"}
-
-
-@pytest.mark.slow
-def test_the_result_is_as_good_as_without_the_wrong_control() -> None:
-    strip = flown()
-
-    def rms(result: Result) -> float:
-        errors = result.points.cartesian - strip.xyz[result.points.number]
-        return float(np.sqrt((errors**2).mean()))
-
-    wrong = rms(adjusted(strip, {"p6_1": (0.0, 0.0, 8.0)}))
-    assert 0.01 < wrong < 1.15 * rms(adjusted(strip))
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_no_findings")
-def test_good_control_is_left_alone() -> None:
-    alarms = [bool(adjusted(flown(seed)).strips[0].wrong_control) for seed in range(12)]
-    assert sum(alarms) <= 1  # level 1 % a strip
-
-
-# --------------------------------------------------------------------------------------------------------- the log
-
-
-def test_rejected_control_stands_in_the_log() -> None:
-    wrong = {"p3_1": (0.0, 8.0, 0.0), "p6_0": (0.0, 0.0, 4.0)}
-    result = adjusted(flown(), wrong)
-    rows = {row["point"]: row for row in document_of(result)["rejected"] if row["stage"] == "control"}
-    assert set(rows) == set(wrong)
-    for name, size in (("p3_1", 8.0), ("p6_0", 4.0)):
-        row = rows[name]
-        assert row["size"] == pytest.approx(size, abs=0.3)
-        assert row["size_unit"] == "m"
-        assert row["value"] > row["limit"] > 2
-        assert not row["readmitted"]
-    assert "north by about +" in rows["p3_1"]["reason"]
-    assert "up by about +" in rows["p6_0"]["reason"]
 
 
 # -------------------------------------------------------------------------------------------- much wrong control
@@ -153,23 +108,3 @@ def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> Non
     row_of = {name: row for row, name in enumerate(control.ids)}
     rows = [row_of[name] for name in kept.ids]
     assert np.array_equal(kept.use, control.use[rows] & ~bad[rows])
-
-
-@pytest.mark.slow
-def test_a_scale_that_may_be_wrong_does_not_cost_sound_control() -> None:
-    """One of the two points that join the models is wrong along the base: which, nobody can tell."""
-    strip = flown(extra=20)
-    o = strip.observations
-    on = {number: set(o.photo[o.point == number].tolist()) for number in range(len(o.point_ids))}
-    joining = {strip.at["p5_1"], strip.at["p5_-1"]}
-    others = [number for number, photos in on.items() if {4, 5, 6} <= photos and number not in joining]
-    keep = ~(np.isin(o.point, others) & (o.photo == 6))
-    xy = o.xy.copy()
-    xy[(o.point == strip.at["p5_1"]) & (o.photo == 5), 0] += 0.3
-    few = replace(o, photo=o.photo[keep], point=o.point[keep], xy=xy[keep], sigma=o.sigma[keep])
-    result = adjusted(replace(strip, observations=few))
-    assert not result.strips[0].wrong_control
-    assert [note.photos for note in result.notes if note.code == "contradicting-joint"] == [("106",)]
-    result = adjusted(replace(strip, observations=few), {"p12_0": (0.0, 0.0, 8.0)})
-    assert not result.strips[0].wrong_control
-    assert list(result.not_determined) == ["p12_0"]  # below the last photo: its height or its image there

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip.gross_errors.pairs import deletion, pair_search, screening
-from photostrip.strip.gross_errors.pairs.global_test import GlobalTest, ParallaxScatter
+from photostrip.strip.gross_errors import pair_screening, pair_search
+from photostrip.strip.gross_errors.pair_search import GlobalTest
 from photostrip.strip.relative_orientation import robust, solution
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
-from photostrip.strip.robust import falling_weights
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, TruePairs, batch, true_pairs
 from tests.vectors import Vector, cases
@@ -39,9 +37,11 @@ def spoiled(flown: TruePairs, errors: Floats) -> Pairs:
     return replace(flown.pairs, left=left)
 
 
-def examined(pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA) -> screening.ScreenedPairs:
+def examined(
+    pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA
+) -> pair_screening.ScreenedPairs:
     oriented, converged = orient_unchecked(pairs)
-    return screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
+    return pair_screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
 
 
 def level(seed: int, pairs: int, counts: tuple[int, ...] = (2, 2, 3, 3, 3, 3), sigma: float = SIGMA) -> TruePairs:
@@ -57,23 +57,12 @@ def test_a_gain_is_what_an_adjustment_without_the_points_loses(seed: int, n: int
     design, values = rng.normal(size=(n, 5)), rng.normal(size=n)
     matrix = np.eye(n) - design @ np.linalg.pinv(design)
     residual = matrix @ values
-    sets = deletion.subsets(n, k)
-    found = deletion.gains(residual[None], matrix[None], sets)[0]
+    sets = pair_search.subsets(n, k)
+    found = pair_search.gains(residual[None], matrix[None], sets)[0]
     for place in nonempty(rng.choice(len(sets), 5)):
         rest = np.setdiff1d(np.arange(n), sets[place])
         squares = np.linalg.lstsq(design[rest], values[rest], rcond=None)[1][0]
         assert residual @ residual - found[place] == pytest.approx(squares, rel=1e-6, abs=1e-9)
-
-
-def test_the_subsets_are_all_there_are() -> None:
-    assert deletion.subsets(16, 3).shape == (560, 3)
-    assert deletion.subsets(5, 2).tolist() == [list(pair) for pair in combinations(range(5), 2)]
-
-
-def test_a_set_that_empties_a_parameter_gains_nothing() -> None:
-    design = np.array([[1.0, 0], [1, 0], [1, 0], [0, 1]])
-    matrix = np.eye(4) - design @ np.linalg.pinv(design)
-    assert deletion.gains(np.zeros((1, 4)), matrix[None], np.array([[3]]))[0, 0] == -np.inf
 
 
 def adjusted(rng: np.random.Generator, n: int, wrong: int) -> tuple[Floats, Floats]:
@@ -89,31 +78,15 @@ def test_the_search_finds_the_best_of_all_sets(seed: int, n: int, wrong: int) ->
     residual, basis = adjusted(np.random.default_rng(seed), n, wrong)
     target = np.array([chi2_quantile(0.9995, n - 5 - k) if n - k >= 6 else -np.inf for k in (1, 2, 3)])
     matrix = np.eye(n) - basis @ basis.transpose(0, 2, 1)
-    (found,) = deletion.search(residual, basis, target)
+    (found,) = pair_search.smallest_sets(residual, basis, target)
     total = float((residual**2).sum())
     for k in (1, 2, 3):
-        sets = deletion.subsets(n, k)
-        gain = deletion.gains(residual, matrix, sets)[0]
+        sets = pair_search.subsets(n, k)
+        gain = pair_search.gains(residual, matrix, sets)[0]
         if total - gain.max() <= target[k - 1]:
             assert found.tolist() == sets[gain.argmax()].tolist()
             return
     assert not len(found)
-
-
-@pytest.mark.parametrize(("wrong", "most"), [(2, 500), (200, 0)])
-def test_of_many_points_few_are_formed_into_sets(wrong: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All sets of two of 800 points are 319 600; none is formed where not even the largest residuals would do."""
-    residual, basis = adjusted(np.random.default_rng(8), 800, wrong)
-    formed, gains = list[int](), deletion.gains
-
-    def counted(residuals: Floats, matrix: Floats, sets: NDArray[np.intp]) -> Floats:
-        formed.append(len(sets))
-        return gains(residuals, matrix, sets)
-
-    monkeypatch.setattr(deletion, "gains", counted)
-    (found,) = deletion.search(residual, basis, np.array([chi2_quantile(0.9995, 795 - k) for k in (1, 2, 3)]))
-    assert len(found) == (2 if wrong == 2 else 0)
-    assert sum(formed) <= most
 
 
 # -------------------------------------------------------------------------------------------- printed results
@@ -153,39 +126,6 @@ def test_a_fifth_of_wrong_points_comes_out_and_nothing_else(size: float) -> None
     assert np.median(flown.errors(found.orientation.elements)) < 1.5 * np.median(clean)
 
 
-@pytest.mark.slow
-def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_looks_wrong() -> None:
-    flown = level(6, 50, (3,) * 6)
-    errors = np.zeros((50, 18))
-    errors[:, 6:8] = 0.2  # two of three points of zone 3
-    pairs = spoiled(flown, errors)
-    found = examined(pairs)
-    out = ~found.orientation.used.reshape(50, 18)
-    assert out[:, 6:8].all()
-    assert out.sum() <= 102
-    assert {int(found.zone[r.row]) for r in found.rejections if not r.readmitted} == {3}
-    by_tau = ~examined(pairs, RelativeSettings(screening="tau")).orientation.used.reshape(50, 18)
-    assert not by_tau[:, 6:8].all(axis=1).any()
-
-
-@pytest.mark.slow
-def test_wrong_points_that_stand_alone_in_their_zones_go_rather_than_good_ones() -> None:
-    flown = level(25, 20, (4, 1, 4, 1, 4, 1))
-    errors = np.zeros((20, 15))
-    errors[:, [4, 9]] = [0.5, 10.0]  # the only points of zones 2 and 4
-    found = examined(spoiled(flown, errors))
-    assert (~found.orientation.used.reshape(20, 15) == (errors > 0)).all()
-
-
-def test_the_estimated_size_is_that_of_the_error() -> None:
-    flown = level(7, 30)
-    errors = np.zeros((30, 16))
-    errors[:, 9] = 0.3
-    sizes = [r.size for r in examined(spoiled(flown, errors)).rejections]
-    assert np.mean(sizes) == pytest.approx(0.3, abs=0.01)  # y parallax is left minus right
-    assert np.std(sizes) > 1 * MICROMETRE
-
-
 def test_clean_pairs_lose_next_to_nothing() -> None:
     found = examined(level(8, 1000).pairs)
     touched = np.unique(found.orientation.pairs.pair[~found.orientation.used])
@@ -199,28 +139,6 @@ def test_a_sigma_stated_far_too_small_costs_no_good_points(understated: float) -
     found = examined(level(9, 60).pairs, sigma=SIGMA / understated)
     assert found.scatter.found == pytest.approx(np.sqrt(2) * SIGMA, rel=0.12)
     assert (~found.orientation.used).mean() < 0.002
-
-
-def test_a_sigma_stated_too_large_is_kept() -> None:
-    found = examined(level(10, 20).pairs, sigma=3 * SIGMA)
-    assert found.scatter.by_pair == pytest.approx(3 * np.sqrt(2) * SIGMA)
-    assert np.isnan(found.scatter.found)
-
-
-@pytest.mark.slow
-def test_neither_the_order_of_rows_nor_that_of_pairs_matters() -> None:
-    flown = level(12, 12, (3,) * 6)
-    rng = np.random.default_rng(13)
-    wrong = rng.permuted(np.tile(np.arange(18) < 5, (12, 1)), axis=1)
-    pairs = spoiled(flown, np.where(wrong, rng.uniform(0.1, 5.0, wrong.shape), 0.0))
-    out = ~examined(pairs).orientation.used
-    order = np.concatenate([18 * k + rng.permutation(18) for k in rng.permutation(12)])
-    shuffled = replace(pairs, left=pairs.left[order], right=pairs.right[order])
-    assert (~examined(shuffled).orientation.used).tolist() == out[order].tolist()
-
-
-def test_noise_free_pairs_lose_nothing() -> None:
-    assert examined(level(14, 20, sigma=0.0).pairs).orientation.used.all()
 
 
 def test_errors_that_cannot_be_found_are_suspected() -> None:
@@ -262,49 +180,6 @@ def test_what_no_search_can_put_right_is_given_up(wrong: float, monkeypatch: pyt
 # --------------------------------------------------------------------------------------------- what can be seen
 
 
-def test_the_work_grows_with_the_logarithm_of_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    """More than half of the 120 points of one pair are wrong, so that the robust start is of no use."""
-    flown = level(8, 8, (20,) * 6)
-    rng = np.random.default_rng(9)
-    errors = np.zeros((8, 120))
-    errors[3] = np.where(rng.random(120) < 0.7, rng.normal(0.0, 5.0, 120), 0.0)
-    rounds, again = list[int](), orient_again
-
-    def counted(*given: Any) -> Orientation:  # noqa: ANN401 (as they are)
-        rounds.append(1)
-        return again(*given)
-
-    monkeypatch.setattr(pair_search, "orient_again", counted)
-    found = examined(spoiled(flown, errors))
-    gone = int((~found.orientation.used).sum())
-    assert found.masked.tolist() == [number == 3 for number in range(8)]
-    assert gone > 40
-    assert len(rounds) < gone / 2
-
-
-def test_of_the_points_beyond_two_hundred_of_a_pair_more_go_at_a_time_as_if_they_were_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """An eighth of them: what the robust start cannot say of 420 points goes in fewer rounds."""
-    flown, rng = level(8, 8, (70,) * 6), np.random.default_rng(9)
-    errors = np.zeros((8, 420))
-    errors[3] = np.where(rng.random(420) < 0.7, rng.normal(0.0, 5.0, 420), 0.0)
-    again, rounds = orient_again, dict[int, int]()
-    found = []
-    for ample in (pair_search.AMPLE, 420):
-        monkeypatch.setattr(pair_search, "AMPLE", ample)
-        rounds[ample] = 0
-
-        def counted(*given: Any, ample: int = ample) -> Orientation:  # noqa: ANN401 (as they are)
-            rounds[ample] += 1
-            return again(*given)
-
-        monkeypatch.setattr(pair_search, "orient_again", counted)
-        found.append(examined(spoiled(flown, errors)).orientation.used)
-    assert 2 * rounds[200] < rounds[420]
-    assert (found[0] != found[1]).mean() < 0.01
-
-
 def test_redundancy_and_detectable_errors_of_standard_points_are_those_of_the_literature() -> None:
     # six points: 1/3 in the middle, 1/12 in the corners
     flown = true_pairs(
@@ -329,48 +204,6 @@ def test_robust_elements_are_those_of_the_good_points(share: int, found_in: int)
     assert (found.scale[right] < 1.01 * np.sqrt(2) * SIGMA).all()
 
 
-def test_robust_elements_have_the_points_in_front_of_the_cameras() -> None:
-    """A base turned round leaves the same parallaxes, with all points behind both cameras."""
-    flown = level(17, 4, (5,) * 6)
-    turned = np.array([-1.0, 1.0, -1.0, -1.0, 1.0]) * flown.orient().elements + np.array([0.0, np.pi, 0.0, 0.0, np.pi])
-    found = robust.solve(turned, flown.pairs, np.full(4, np.sqrt(2) * SIGMA))
-    assert not solution.in_front_of_cameras(turned, flown.pairs).any()
-    assert solution.in_front_of_cameras(found.elements, flown.pairs).all()
-    assert flown.errors(found.elements) == pytest.approx(0.0, abs=1e-3)
-
-
-@pytest.mark.parametrize(("each", "share", "found_in"), [(2, 3, 52), (2, 4, 43), (3, 6, 50)])
-def test_a_wrong_point_that_half_of_a_pair_agrees_with_does_not_win(each: int, share: int, found_in: int) -> None:
-    # with the median in place of the sum: 46, 40 and 48 of 60
-    points = 6 * each
-    flown, rng = level(17, 60, (each,) * 6), np.random.default_rng(18)
-    wrong = rng.permuted(np.tile(np.arange(points) < share, (60, 1)), axis=1)
-    pairs = spoiled(flown, np.where(wrong, np.exp(rng.uniform(np.log(0.05), np.log(20.0), wrong.shape)), 0.0))
-    found = robust.orient_robustly(pairs, np.full(60, np.sqrt(2) * SIGMA), 3)
-    small = np.abs(solution.y_parallaxes(found.elements, pairs)).reshape(60, points) < 5 * np.sqrt(2) * SIGMA
-    assert (small | wrong).all(axis=1).sum() >= found_in
-
-
-def test_three_hundred_sets_and_ten_steps_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    sets, steps = list[int](), list[int]()
-    pinv = np.linalg.pinv
-
-    def counted_sets(matrices: Floats) -> Floats:
-        sets.append(len(matrices))
-        return np.asarray(pinv(matrices), float)
-
-    def counted_steps(size: Floats) -> Floats:
-        steps.append(len(size))
-        return falling_weights(size)
-
-    monkeypatch.setattr(np.linalg, "pinv", counted_sets)
-    monkeypatch.setattr(robust, "falling_weights", counted_steps)
-    errors = np.zeros((1, 18))
-    errors[0, :5] = [0.3, -0.2, 0.5, 0.4, -0.6]
-    robust.orient_robustly(spoiled(level(17, 1, (3,) * 6), errors), np.array([np.sqrt(2) * SIGMA]), 3)
-    assert (sets, len(steps)) == ([300], 30)  # of the turn, of the first elements, of those from the best set
-
-
 # ------------------------------------------------------------------------------------------------- limits in force
 
 
@@ -380,75 +213,3 @@ def test_the_level_of_a_strip_is_shared_out_among_its_pairs_and_their_two_tests(
     assert test.limits(np.array([16, 5])) == pytest.approx([chi2_quantile(0.999, 11), np.inf])
     assert test.largest_limits(np.array([16])) == pytest.approx([normal_quantile(1 - 0.001 / 32)])
     assert test.take(np.array([1, 3])).level == test.level
-
-
-def test_a_residual_with_a_redundancy_below_a_hundredth_says_nothing() -> None:
-    oriented = level(19, 1).orient()
-    for share, speaks in ((0.0095, False), (0.0105, True)):
-        redundancy = np.full(16, share)
-        value = GlobalTest.of(np.ones(1)).standardised(replace(oriented, redundancy=redundancy))
-        assert (value > 0).all() == speaks
-        gain = deletion.gains(np.ones((1, 1)), np.full((1, 1, 1), share), np.zeros((1, 1), int))
-        assert np.isfinite(gain).all() == speaks
-
-
-def test_sets_of_three_are_formed_from_24_points() -> None:
-    rng = np.random.default_rng(20)
-    design = rng.normal(size=(30, 5))
-    matrix = np.eye(30) - design @ np.linalg.pinv(design)
-    assert deletion._triples((matrix @ rng.normal(size=30))[None], matrix[None]).shape == (1, 2024, 3)
-
-
-@pytest.mark.parametrize(("ratio", "contradicted"), [(1.28, False), (1.35, True)])
-def test_the_stated_scatter_holds_until_more_than_a_fifth_of_wrong_points_is_needed(
-    ratio: float, *, contradicted: bool
-) -> None:
-    oriented = level(21, 1).orient()
-    scale = ParallaxScatter.of(oriented, 1e-9).found
-    assert scale == pytest.approx(np.sqrt(2) * SIGMA, rel=0.5)
-    proof = 1 + 2.3263 * 1.1664 / np.sqrt(11)  # of one pair of 16 points, at 1 %
-    found = ParallaxScatter.of(oriented, scale / (ratio * proof))
-    assert np.isfinite(found.found) == contradicted
-    assert found.by_pair[0] == pytest.approx(scale if contradicted else scale / (ratio * proof))
-
-
-def test_the_scatter_is_that_of_the_strip_when_one_photo_is_worse() -> None:
-    flown = level(22, 20, (3,) * 6)
-    rng = np.random.default_rng(23)
-    noise = np.zeros((20, 18))
-    noise[7:9] = rng.normal(0, 3 * SIGMA, (2, 18))
-    found = examined(spoiled(flown, noise))
-    assert np.isnan(found.scatter.found)
-    assert (~found.orientation.used).sum() <= 12
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("scatter", "searched"), [(0.008, True), (0.013, False)])
-def test_parallaxes_that_scatter_by_a_hundredth_of_the_principal_distance_are_not_searched(
-    scatter: float, *, searched: bool
-) -> None:
-    focal = level(24, 1).pairs.focal
-    found = examined(level(24, 40, (4,) * 6, sigma=scatter * focal / np.sqrt(2)).pairs)
-    assert np.isfinite(found.scatter.found) == searched
-    assert found.masked.all() == (not searched)
-
-
-@pytest.mark.slow
-def test_the_number_of_pairs_at_a_time_is_for_the_memory_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    flown = level(25, 96, (3,) * 6)
-    rng = np.random.default_rng(26)
-    wrong = rng.permuted(np.tile(np.arange(18) < 4, (96, 1)), axis=1)
-    pairs = spoiled(flown, np.where(wrong, rng.uniform(0.1, 5.0, wrong.shape), 0.0))
-    sizes, of_sets = list[int](), deletion.search
-
-    def counted(residuals: Floats, *others: Any) -> Any:  # noqa: ANN401 (as they are)
-        sizes.append(len(residuals))
-        return of_sets(residuals, *others)
-
-    monkeypatch.setattr(deletion, "search", counted)
-    used = examined(pairs).orientation.used
-    assert 40 < max(sizes) <= 64
-    monkeypatch.setattr(pair_search, "AT_ONCE", 10)
-    sizes.clear()
-    assert (examined(pairs).orientation.used == used).all()
-    assert max(sizes) <= 10

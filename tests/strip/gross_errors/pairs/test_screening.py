@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from photostrip.errors import EXIT_INPUT, InputError
-from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.strip.gross_errors.pairs import screening
+from photostrip.statistics import grubbs_limit
+from photostrip.strip.gross_errors import pair_screening
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, assess_pairs, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.relative_orientation.solution import solve_elements
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, TruePairs, batch, gruber, measured, true_pairs
-from tests.vectors import cases, section
+from tests.vectors import cases
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,7 +33,7 @@ ZONES = (2, 2, 3, 3, 3, 3)  # points of the six zones in the published experimen
 
 def screened(orientation: Orientation, settings: RelativeSettings, sigma: float) -> tuple[Orientation, Log]:
     """Reject points and give the pairs without them, and the log."""
-    found = screening.screen_pairs(orientation, settings, sigma)
+    found = pair_screening.screen_pairs(orientation, settings, sigma)
     return found.orientation, found.rejections
 
 
@@ -81,8 +79,8 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     expected, test = example.expected[f"parallax_then_{second}"], second.removeprefix("studentised_")
     oriented, names = of_example(example)
     rel = example.tol["values_rel"]
-    after, log = screening._stage(oriented, "parallax", example.input["T_mm"])
-    found, rest = screening._stage(after, test, example.input["alpha"])
+    after, log = pair_screening._stage(oriented, "parallax", example.input["T_mm"])
+    found, rest = pair_screening._stage(after, test, example.input["alpha"])
     log = [*log, *rest]
     rejected = [line for line in expected["log"] if line.get("rejected", True)]
     assert [(entry.test, names[entry.row]) for entry in log] == [(line["stage"], line["id"]) for line in rejected]
@@ -91,7 +89,7 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     compare(found, tuple(log), names, expected, example.tol)
     last = expected["log"][-1]
     if not last.get("rejected", True):  # the largest value of the last round stays below its limit
-        value, limit, _ = screening.tested(found, test, example.input["alpha"])
+        value, limit, _ = pair_screening.tested(found, test, example.input["alpha"])
         value[~found.used] = -np.inf
         assert names[int(value.argmax())] == last["id"]
         assert value.max() == pytest.approx(last["value"], rel=rel)
@@ -104,11 +102,6 @@ def test_screening_as_a_project_asks_for_it(example: Vector) -> None:
     settings = RelativeSettings("parallax+grubbs", example.input["alpha"], example.input["T_mm"])
     found, log = screened(oriented, settings, example.input["sigma_q_apriori_mm"])
     compare(found, log, names, example.expected["parallax_then_grubbs"], example.tol)
-
-
-def test_all_examples_are_here() -> None:
-    assert len(section("grubbs")) == 8
-    assert len([example for example in section("grubbs") if example.id.startswith("rejection")]) == 4
 
 
 # -------------------------------------------------------------------------------------- an experiment
@@ -161,7 +154,7 @@ def test_the_shares_of_the_published_experiment(limit: float, published: dict[st
 @pytest.mark.parametrize(("method", "share"), [("grubbs", 0.025), ("tau", 0.052)])
 def test_false_alarms_of_clean_models(method: str, share: float) -> None:
     oriented, _ = experiment(2, 4000, errors=False)
-    value, limit, _ = screening.tested(oriented, method, 0.05)
+    value, limit, _ = pair_screening.tested(oriented, method, 0.05)
     alarms = np.maximum.reduceat(value > limit, oriented.pairs.starts).mean()
     assert alarms == pytest.approx(share, abs=4 * np.sqrt(share / 4000))
 
@@ -193,114 +186,3 @@ def test_the_automatic_limit_is_four_sigma_of_a_parallax() -> None:
     _, log = screened(oriented, RelativeSettings("parallax+grubbs", parallax_limit=10.0), SIGMA)
     assert log[0].test == "grubbs"
     assert log[0].limit == pytest.approx(grubbs_limit(16, 0.05))
-
-
-def test_a_smaller_alpha_rejects_less() -> None:
-    oriented, _ = experiment(5, 200, errors=False)
-    counts = [len(screened(oriented, RelativeSettings("tau", alpha), 0.01)[1]) for alpha in (0.2, 0.05, 0.001)]
-    assert counts[0] > counts[1] > counts[2]
-
-
-def test_without_errors_nothing_is_rejected() -> None:
-    exact = clean(4, 3, sigma=0.0).orient()
-    for method in ("parallax+grubbs", "tau", "none"):
-        found, log = screened(exact, RelativeSettings(method, 0.2, 1e-6), SIGMA)
-        assert log == ()
-        assert found.used.all()
-
-
-def test_none_rejects_nothing() -> None:
-    oriented = spoiled(clean(4), {3: 2.0})
-    found, log = screened(oriented, RelativeSettings("none"), SIGMA)
-    assert log == ()
-    assert found is oriented
-
-
-def test_the_worst_goes_first_and_one_at_a_time() -> None:
-    truth = clean(6, 2, points=(4,) * 6)
-    oriented = spoiled(truth, {2: 2.0, 13: -0.5, 24 + 7: 1.0})
-    _, log = screened(oriented, RelativeSettings("parallax+grubbs", parallax_limit=0.1), SIGMA)
-    assert rows_of(log) == [2, 31, 13]  # the first round takes the worst of each pair, the next what is left
-    neighbours = np.flatnonzero(np.abs(oriented.parallax) > 0.1)
-    assert len(neighbours) > 3  # good points that a bad one had pulled; they stay
-
-
-def test_a_rejected_pair_is_what_it_is_without_the_point() -> None:
-    truth = clean(7, 3)
-    found, log = screened(spoiled(truth, {16 + 4: 0.8}), RelativeSettings("parallax+grubbs"), SIGMA)
-    assert rows_of(log) == [20]
-    left, right = (np.delete(side[16:32], 4, axis=0)[None] for side in (truth.pairs.left, truth.pairs.right))
-    alone = TruePairs(batch(left, right, truth.pairs.focal), truth.base[1:2], truth.rotation[1:2]).orient()
-    assert np.allclose(found.elements[1], alone.elements[0], rtol=0, atol=1e-12)
-    assert found.sigma0[1] == pytest.approx(alone.sigma0[0], rel=1e-6)
-
-
-def test_other_pairs_keep_every_digit() -> None:
-    truth = clean(8, 3)
-    before, (after, log) = (
-        truth.orient(),
-        screened(spoiled(truth, {20: 0.8}), RelativeSettings("parallax+grubbs"), SIGMA),
-    )
-    assert rows_of(log) == [20]
-    for number in (0, 2):
-        assert np.array_equal(before.elements[number], after.elements[number])
-        rows = before.pairs.pair == number
-        assert np.array_equal(before.parallax[rows], after.parallax[rows])
-        assert np.array_equal(before.redundancy[rows], after.redundancy[rows])
-
-
-def test_points_behind_the_cameras_go_first() -> None:
-    truth = clean(9, points=(4,) * 6)
-    left, right = truth.pairs.left.copy(), truth.pairs.right
-    left[3] = right[3] - [20.0, 0.0]  # rays that spread: they meet above the cameras
-    oriented = TruePairs(batch(left[None], right[None], truth.pairs.focal), truth.base, truth.rotation).orient()
-    found, log = screened(oriented, RelativeSettings("none"), SIGMA)
-    assert [(entry.row, entry.test) for entry in log] == [(3, "in front")]
-    assert not found.used[3]
-    assert truth.errors(found.elements)[0] < 1e-3
-
-
-# ------------------------------------------------------------------------------------------- what may not
-
-
-@pytest.mark.parametrize("method", ["parallax+grubbs", "tau"])
-def test_a_pair_keeps_six_points(method: str) -> None:
-    truth = clean(10, points=(2, 1, 2, 1, 1, 1))
-    errors = {row: 3.0 * (-1) ** row for row in range(0, 8, 2)}
-    found, log = screened(spoiled(truth, errors), RelativeSettings(method, 0.2, 0.001), SIGMA)
-    assert found.points_used[0] >= 6
-    assert len(log) <= 2
-    six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
-    found, log = screened(six, RelativeSettings(method, 0.2, 0.001), SIGMA)
-    assert log == ()
-
-
-def test_grubbs_needs_seven_points() -> None:
-    six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
-    assert np.all(screening.tested(six, "grubbs", 0.05)[1] == np.inf)
-    seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
-    assert screening.tested(seven, "grubbs", 0.05)[1][0] == pytest.approx(grubbs_limit(7, 0.05))
-
-
-def test_residuals_below_a_millionth_of_a_micrometre_are_rounding() -> None:
-    oriented = clean(10).orient()
-    pattern = np.where(np.arange(16) % 2, 1.0, -1.0) * np.sqrt(15 / 16)  # of a standard deviation of one
-    for size, tested in ((0.8e-9, False), (1.6e-9, True)):
-        limit = screening.tested(replace(oriented, parallax=size * pattern), "grubbs", 0.05)[1]
-        assert np.isfinite(limit).all() == tested
-
-
-def test_tau_needs_a_redundancy_of_three() -> None:
-    seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
-    assert np.all(screening.tested(seven, "tau", 0.05)[1] == np.inf)
-    eight = spoiled(clean(10, points=(2, 2, 1, 1, 1, 1)), {0: 3.0})
-    assert screening.tested(eight, "tau", 0.05)[1][0] == pytest.approx(tau_limit(8, 5, 0.05))
-
-
-@pytest.mark.parametrize("method", ["ransac", "Tau", ""])
-def test_a_method_that_does_not_exist_is_refused_by_name(method: str) -> None:
-    with pytest.raises(InputError) as caught:
-        screened(clean().orient(), RelativeSettings(method), SIGMA)
-    assert caught.value.exit_code == EXIT_INPUT
-    assert f"screening method '{method}' is not available" in str(caught.value)
-    assert "parallax+grubbs" in str(caught.value)

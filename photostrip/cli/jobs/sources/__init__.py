@@ -1,1 +1,0 @@
-"""What the sources print: ``worked`` numbers, and ``tables`` of misprints and equations."""

@@ -1,0 +1,283 @@
+"""Errors at check points against what the covariances let expect of all of them together.
+
+How precise points and photos of one strip are, and of all strips together.
+
+How precise points and photos of a strip of photos are: covariances from the image coordinates.
+
+Joint covariances of points of a run: what the difference of two of them, or a mean of several, is good for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.errors import Fault, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline.given_points import rows_of_given
+from photostrip.pipeline.results import Adjusted, Precision, StripResult
+from photostrip.pipeline.strips.photos_on_control import OrientedPhotos
+from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.strip import absolute_orientation, fitted_strip
+from photostrip.strip.fitted_strip import (
+    CheckErrors,
+    FittedStrip,
+    Misclosures,
+    PhotoErrors,
+    differentiate_photos,
+    image_variance,
+)
+from photostrip.strip.strip_errors import StripErrors
+
+if TYPE_CHECKING:
+    from photostrip.pipeline.results import Result
+
+
+MOST_TESTED = 100  # check points of a strip that are tested together, spread over it
+
+
+class CheckPoints(NamedTuple):
+    """Check points that a strip holds, along it."""
+
+    control: ControlPoints  # all given points
+    chosen: Numbers  # (c,): rows of the check points there
+    rows: Numbers  # (c,): their rows in ``strip.formed.point``
+
+    @property
+    def points(self) -> ControlPoints:
+        return self.control.take(self.chosen)
+
+    def spread(self) -> CheckPoints:
+        """Those that are tested together."""
+        count = len(self.rows)
+        if count <= MOST_TESTED:
+            return self
+        some = np.linspace(0, count - 1, MOST_TESTED).round().astype(int)
+        return self._replace(chosen=self.chosen[some], rows=self.rows[some])
+
+
+def check_points(strip: StripResult, control: ControlPoints, observations: PhotoPoints) -> CheckPoints:
+    """Check points of a strip among all given points; the observations name its points."""
+    rows = rows_of_given(control.ids, strip.formed.point, observations.point_ids)
+    found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
+    found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
+    return CheckPoints(control, found, rows[found])
+
+
+@dataclass(frozen=True, eq=False)
+class CheckDifferences:
+    """How a strip differs from its check points."""
+
+    checks: CheckPoints
+    coordinates: Misclosures
+    difference: Floats  # (w,): adjusted minus given, metres
+
+
+def compare_with_checks(
+    strip: StripResult, checks: CheckPoints, frames: Sequence[GroundFrame]
+) -> CheckDifferences | None:
+    """Compare a strip with its check points, in the ground frames of the given points; None without any."""
+    if not len(checks.rows):
+        return None
+    xyz = strip.xyz[checks.rows]
+    targets = absolute_orientation.Targets(checks.points, frames, strip.intermediate)
+    axes = targets.axes(xyz)
+    found = fitted_strip.misclosures(targets.turned(xyz), checks.rows, axes)
+    return CheckDifferences(checks, found, targets.misclosures(xyz, axes)[found.point, found.axis])
+
+
+def by_fit(found: FittedStrip, compared: CheckDifferences) -> CheckErrors:
+    """Return the errors at the check points of a strip that was fitted to the control."""
+    at = compared.coordinates
+    return errors_at_checks(compared, found.joint_covariance(at.row, at.direction))
+
+
+def errors_at_checks(compared: CheckDifferences, covariance: Floats) -> CheckErrors:
+    """Return all differences; their covariance is that of the adjusted coordinates and of the given ones."""
+    return CheckErrors(
+        ids=compared.checks.points.ids,
+        point=compared.coordinates.point,
+        axis=compared.coordinates.axis,
+        difference=compared.difference,
+        covariance=covariance + np.diag(compared.coordinates.variance),
+    )
+
+
+AT_A_TIME = 100  # control coordinates that two strips share, looked at together
+
+
+@dataclass(frozen=True, eq=False)
+class StripPrecision:
+    """Covariances of one strip in the axes of the Cartesian frame."""
+
+    points: Floats  # (q, 3, 3): of the points of the strip, metres^2
+    photos: Floats  # (m, 6, 6): of centre and small rotation of its photos; NaN where a photo could not be oriented
+    # takes rows of points (n,) and of control coordinates (c,), gives what errors of these coordinates subtract from
+    # these points, (n, 3, c), in the same axes
+    by_control: Callable[[Numbers, Numbers], Floats]
+    # (w, 2): the control coordinates that count: the control point's number among the image points' ids, and its ground
+    # axis
+    control: Numbers
+    variance: Floats  # (w,): their variances, metres^2
+    sigma: float  # standard deviation of an image coordinate of weight one, mm
+    basis: str  # where that comes from
+    check: CheckErrors | None  # errors at the strip's check points, with their covariance
+
+
+def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
+    """Precision of all strips together."""
+    return Precision(
+        points=_means(strips, results, points.number),
+        photos=tuple(strip.photos for strip in strips),
+        sigma=tuple(strip.sigma for strip in strips),
+        basis=tuple(strip.basis for strip in strips),
+        checks=tuple(strip.check for strip in strips),
+    )
+
+
+def _means(strips: Sequence[StripPrecision], results: Sequence[StripResult], number: Numbers) -> Floats:
+    """Covariances (n, 3, 3) of the points of all strips; a point of several strips is their mean.
+
+    Strips have no image coordinate in common; what their points share are the errors of common control.
+    """
+    if len(strips) == 1:
+        return strips[0].points
+    rows = [np.searchsorted(number, result.formed.point) for result in results]
+    count = np.bincount(np.concatenate(rows), minlength=len(number))
+    total = np.zeros((len(number), 3, 3))
+    for row, strip in zip(rows, strips, strict=True):
+        total[row] += strip.points
+    for (row_a, a), (row_b, b) in combinations(zip(rows, strips, strict=True), 2):
+        shared, in_a, in_b = np.intersect1d(row_a, row_b, return_indices=True)
+        _, of_a, of_b = np.intersect1d(_keys(a), _keys(b), return_indices=True)
+        if not len(shared):
+            continue
+        for start in range(0, len(of_a), AT_A_TIME):
+            part = slice(start, start + AT_A_TIME)
+            by_a, by_b = a.by_control(in_a, of_a[part]), b.by_control(in_b, of_b[part])
+            mixed = (by_a * a.variance[of_a[part]]) @ by_b.transpose(0, 2, 1)
+            total[shared] += mixed + mixed.transpose(0, 2, 1)
+    total /= (count**2)[:, None, None]
+    return total
+
+
+def _keys(strip: StripPrecision) -> Numbers:
+    """One number for each control coordinate."""
+    return np.asarray(strip.control[:, 0] * 3 + strip.control[:, 1], np.intp)
+
+
+MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the square of their number, to 1 s
+
+
+def of_photos(
+    strip: StripResult,
+    on_control: OrientedPhotos,
+    observations: PhotoPoints,
+    given: ControlPoints,
+    *,
+    of_checks: bool,
+) -> StripPrecision:
+    """Covariances of one strip of photos, or ``of_checks`` alone.
+
+    on_control: the same strip before its deformation was corrected.
+    observations: ideal image coordinates of the project.
+    given: all given points; the check points among them are compared with what is found.
+    """
+    checks = check_points(strip, given, observations)
+    compared = compare_with_checks(strip, checks.spread(), on_control.oriented.frames)
+    points = np.full((len(strip.xyz), 3, 3), np.nan)
+    photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
+    stated = strip.of_photos.sigma
+    factor, basis = image_variance(strip.of_photos.orientation, stated)
+    found = fitted(strip, on_control, factor)
+    if of_checks:
+        points[checks.rows] = found.covariances_of_points(checks.rows)
+    else:
+        points = found.covariances_of_points(np.arange(len(points)))
+        solved = np.flatnonzero(strip.of_photos.resection.solved)
+        by_photo = photo_errors(strip, on_control.errors, observations)
+        photos[solved] = found.covariances_of_photos(by_photo, solved)
+    axes, fit = strip.intermediate.axes, found.fit
+    return StripPrecision(
+        points=axes @ points @ axes.T,
+        photos=_turned(strip, photos),
+        by_control=lambda rows, columns: axes @ fit.influence(found.xyz[rows]) @ fit.operator[:, columns],
+        control=_control_of(strip, found.control.point, found.control.axis),
+        variance=found.control.variance,
+        sigma=stated * float(np.sqrt(factor)),
+        basis=basis,
+        check=None if compared is None else by_fit(found, compared),
+    )
+
+
+def too_long(strip: StripResult) -> bool:
+    """Whether a strip was fitted to its control that has too many photos for the covariances of all its points."""
+    stages = strip.photo_stages
+    return stages is not None and len(stages.strip.photos) > MOST_PHOTOS
+
+
+def _control_of(strip: StripResult, point: Numbers, axis: Numbers) -> Numbers:
+    return np.column_stack([strip.formed.point[strip.control_rows][point], axis])
+
+
+def _turned(strip: StripResult, photos: Floats) -> Floats:
+    """Covariances of photos from the intermediate to the Cartesian frame."""
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = strip.intermediate.axes
+    return turn @ photos @ turn.T
+
+
+def fitted(strip: StripResult, on_control: OrientedPhotos, factor: float) -> FittedStrip:
+    """Carry the errors of a strip over the fit to its control, before which it was ``on_control``."""
+    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
+    oriented = on_control.oriented
+    return FittedStrip(
+        errors=on_control.errors,
+        control=oriented.misclosures,
+        fit=on_control.fit(terms),
+        xyz=oriented.xyz,
+        factor=factor,
+    )
+
+
+def photo_errors(strip: StripResult, errors: StripErrors, observations: PhotoPoints) -> PhotoErrors:
+    """Differentiate the orientation of the photos on their adjusted points."""
+    rows = strip.of_photos.rows
+    photo = strip.of_photos.strip.positions(observations)[rows]
+    point = np.searchsorted(strip.formed.point, observations.point[rows])
+    return differentiate_photos(errors, strip.of_photos.resection, strip.xyz, photo, point, rows)
+
+
+def joint_covariance(result: Result, rows: Numbers) -> Floats:
+    """Joint covariances (n, 3, n, 3) of points of ``result.points``, metres^2.
+
+    They stand along east, north and up at each point, or along the axes of a geocentric output.
+    Raises InputError after any other adjustment than a bundle, and of a free network.
+    """
+    ascending, back = np.unique(rows, return_inverse=True)
+    cartesian = result.points.cartesian[ascending]
+    level = result.output.level_axes_at(cartesian)
+    axes = np.broadcast_to(np.eye(3), level.shape) if result.output.kind == "geocentric" else level
+    return _of_bundle(result, ascending, axes)[back][:, :, back]
+
+
+def _of_bundle(result: Result, rows: Numbers, axes: Floats) -> Floats:
+    from photostrip.network.cofactors import coordinates_of, joint_cofactors
+
+    if result.bundle is None:
+        raise _refused("only a bundle adjustment keeps joint covariances", "set processing.adjustment to bundle")
+    if result.bundle.start.free:
+        raise _refused("a free network has no covariances on the ground", "tie it to the ground")
+    solution = result.bundle.screened.solution
+    joint = joint_cofactors(solution, coordinates_of(solution, result.points.number[rows])) * result.bundle.unit**2
+    turned: Floats = np.einsum("iap,ipjq,jbq->iajb", axes, joint.reshape(len(rows), 3, len(rows), 3), axes)
+    return turned
+
+
+def _refused(message: str, fix: str) -> InputError:
+    return InputError(Fault(message, "no-joint-covariance", fix=fix))

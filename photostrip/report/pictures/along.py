@@ -1,0 +1,149 @@
+"""Along the strips: what is left at given points before and after, the polynomial, precision."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from photostrip.notes import Document, counted
+from photostrip.report.page.numbers import short
+from photostrip.report.pictures.chart import Floats, Layer, Line, Marks, Panel, Segments, chart, span
+from photostrip.report.pictures.places import Plan, numbers
+from photostrip.report.pictures.plan import ROLES
+from photostrip.report.pictures.svg import Picture
+
+MOST_STRIPS = 8  # that have panels
+AXES = ("along", "x"), ("across", "y"), ("up", "z")  # of a strip, and of its polynomials
+CURVE_STEPS = 48
+
+
+def worst_strips(sizes: Mapping[str, float]) -> list[str]:
+    """Return the strips that are drawn, in their order: all, or those with the largest sizes."""
+    worst = sorted(sizes, key=lambda strip: -sizes[strip])[:MOST_STRIPS]
+    return [strip for strip in sizes if strip in worst]
+
+
+def deformation_pictures(plan: Plan) -> list[Picture]:
+    """Draw differences at given points along each strip; nothing without given points."""
+    document = plan.document
+    held = {row["id"]: row["strips"] for row in document["control"] if row["measured"]}
+    after = {
+        strip: [
+            n
+            for n in np.flatnonzero(np.isfinite(plan.shift).any(axis=1)).tolist()
+            if not strip or strip in held.get(plan.ids[n], ())
+        ]
+        for strip, photos in plan.strips.items()
+        if photos and (not strip or any(each["id"] == strip for each in document["strips"]))
+    }
+    before = {strip: [row for row in document.get("misclosures", []) if row["strip"] == strip] for strip in after}
+    sizes = {
+        strip: float(np.nanmax(np.abs(plan.shift[rows]), initial=0.0))
+        for strip, rows in after.items()
+        if rows or before[strip]
+    }
+    if not sizes:
+        return []
+    shown = worst_strips(sizes)
+    panels = [panel for strip in shown for panel in _panels(plan, strip, after[strip], before[strip])]
+    caption = "Differences at given points along each strip, along it, across it and in height: adjusted minus given"
+    if any(before.values()):
+        caption += "; circles: strip minus given after the similarity alone"
+    if any(isinstance(layer, Line) for panel in panels for layer in panel.layers):
+        caption += "; the line: what the polynomial takes out, on the axis of the strip"
+    if len(shown) < len(sizes):
+        caption += f". {len(shown)} of {len(sizes)} strips, those with the largest differences"
+    words = counted(len(shown), "strip")
+    rows = [n for strip in shown for n in after[strip]]
+    if rows:
+        n, axis = divmod(int(np.nanargmax(np.abs(plan.shift[rows]))), 3)
+        words += f"; the largest difference is {abs(plan.shift[rows[n]][axis]):.3f} m at {plan.ids[rows[n]]}"
+    title = "Differences at given points" + (", before and after" if any(before.values()) else "")
+    height = 150.0 if len(shown) > 1 else 230.0
+    return [chart("deformation", (title, f"{caption}.", f"{words}."), panels, columns=3, height=height)]
+
+
+def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Document]) -> list[Panel]:
+    course = plan.course(strip)
+    at, shift = course.along(plan.points[after]), course.turned(plan.shift[after])
+    earlier = [row for row in before if row["id"] in plan.row]
+    earlier_at = course.along(plan.points[plan.rows(row["id"] for row in earlier)])
+    towards = np.array([[plan.north[1], plan.north[0], 0.0], [-plan.north[0], plan.north[1], 0.0], [0.0, 0.0, 1.0]])
+    missed = course.turned(numbers(earlier, "east", "north", "up") @ towards.T)
+    ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
+    reach = span(np.concatenate([ends, at, earlier_at]), zero=False, room=0.02)
+    block = next((row for row in plan.document.get("polynomials", []) if row["strip"] == strip), None)
+    terms = list(plan.document["polynomial_terms"].where(strip=strip)) if block else []
+    taken = plan.document["adjustment"] == "polynomial"
+    panels = []
+    for number, (axis, key) in enumerate(AXES):
+        layers: list[Layer] = []
+        of_axis = [row for row in terms if row["axis"] == key]
+        if block and of_axis and earlier:
+            places = np.linspace(min(*ends, *earlier_at), max(*ends, *earlier_at), CURVE_STEPS)
+            start = float(block["reach_from"]) - 1000.0 * float(earlier_at.min())  # X of the first photo
+            curve = np.column_stack([places, -polynomial(of_axis, 1000.0 * places + start)])
+            layers.append(Line(curve, "c2", "polynomial" if taken else "polynomial, not taken"))
+        hints = [f"{row['id']} before: {size:+.3f} m" for row, size in zip(earlier, missed[:, number], strict=True)]
+        at_before = np.column_stack([earlier_at, missed[:, number]])
+        layers += [Marks(at_before, "soft open", "dot", hints, "control before", 7.0)] if earlier else []
+        for role, (words, shape, _) in ROLES.items():
+            own = [n for n, row in enumerate(after) if plan.role[row] == role]
+            if own:
+                places = np.column_stack([at[own], shift[own, number]])
+                hints = [f"{words} {plan.ids[after[n]]}: {shift[n, number]:+.3f} m" for n in own]
+                layers.append(Segments(places * (1.0, 0.0), places, f"{role} thin"))
+                layers.append(Marks(places, role, shape, hints, words, 4.0))
+        title = f"strip {strip}, {axis}" if len(plan.document["strips"]) > 1 else axis
+        labels = "km along the strip" if strip else "km from the first photo", "m"
+        panels.append(Panel(layers, title, labels, x=reach))
+    return panels
+
+
+def polynomial(terms: Sequence[Document], x: Floats) -> Floats:
+    """Return a polynomial on the axis of the strip, where terms with Y vanish."""
+    total = np.zeros_like(x)
+    for row in terms:
+        power = re.fullmatch(r"(?:1|X(?:\^(\d))?)", row["term"])
+        if power:
+            total += row["coefficient"] * x ** (0 if row["term"] == "1" else int(power[1] or 1))
+    return total
+
+
+CURVES = (
+    ("plan", "points, plan", "c1"),
+    ("height", "points, height", "c2"),
+    ("centre_plan", "perspective centres, plan", "c3 dashed"),
+    ("centre_height", "perspective centres, height", "c4 dotted"),
+)
+
+
+def precision_pictures(document: Document) -> list[Picture]:
+    """Draw the standard deviations of points and perspective centres along every strip."""
+    rows: list[Document] = document.get("precision", {}).get("along") or []
+    if not rows:
+        return []
+    by_strip: dict[str, list[Document]] = {}
+    for row in rows:
+        by_strip.setdefault(row["strip"], []).append(row)
+    keys = [key for key, *_ in CURVES]
+    sizes = {strip: float(np.nanmax(numbers(own, *keys), initial=0.0)) for strip, own in by_strip.items()}
+    shown, high = worst_strips(sizes), span(list(sizes.values()))
+    panels = []
+    for strip in shown:
+        km = numbers(by_strip[strip], "distance") / 1000.0
+        layers = [Line(np.hstack([km, numbers(by_strip[strip], key)]), kind, words) for key, words, kind in CURVES]
+        panels.append(Panel(layers, f"strip {strip}" if len(sizes) > 1 else "", ("km along the strip", "m"), y=high))
+    caption = (
+        "Standard deviations along each strip, mean of the points near each photo: they are smallest where the control"
+        " stands."
+    )
+    if len(shown) < len(sizes):
+        caption += f" {len(shown)} of {len(sizes)} strips, those with the largest of them."
+    points = document["precision"]["points"]
+    worst = [f"{name} {short(points[name]['max'], 3)} m at {points[name]['worst']}" for name in ("plan", "height")
+             if points[name]["max"] is not None]  # fmt: skip
+    words = "Precision along the strip", caption, "; ".join(worst) or "Not known."
+    return [chart("precision", words, panels, columns=min(2, len(shown)), height=210.0 if len(shown) == 1 else 140.0)]

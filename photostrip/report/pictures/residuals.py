@@ -1,0 +1,250 @@
+"""Image residuals: vectors in the photos, their mean over the image plane of each camera, their distribution."""
+
+from __future__ import annotations
+
+from statistics import NormalDist, median
+from typing import NamedTuple
+
+import numpy as np
+
+from photostrip.notes import Document, counted
+from photostrip.report.pictures.chart import (
+    Areas,
+    Bar,
+    Floats,
+    Layer,
+    Line,
+    Map,
+    Marks,
+    Panel,
+    Range,
+    Segments,
+    box,
+    chart,
+    nice,
+)  # fmt: skip
+from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, rays_of
+from photostrip.report.pictures.svg import Picture
+from photostrip.report.sections.project import cameras_of
+
+MOST_PHOTOS, COLUMNS = 24, 6  # on the picture
+MOST_RAYS = 150  # of a photo
+CELLS = 8  # of the grid along the longer side of the image plane
+LEAST_IN_CELL = 3  # residuals from which a cell has a mean
+SHARE_ON_SCALE = 0.95  # share of the vectors that are not longer than a length of the scale
+CAMERAS = 4  # whose image planes are drawn
+BARS = 33  # of a histogram, an odd number
+LEAST_REACH = 4.5  # standard deviations that a histogram holds, at least
+
+
+def rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
+def residual_pictures(plan: Plan) -> list[Picture]:
+    """Draw the image residuals; nothing where photos have no orientation of their own."""
+    rays = rays_of(plan.document)
+    at = plan.images(rays.photo, rays.point)
+    known = np.asarray(np.isfinite(np.hstack([at, rays.v])).all(axis=1))
+    if not (known & rays.used).any():
+        return []
+    return [_vectors(plan, rays, at, known), *_planes(plan, rays, at, known & rays.used), _histogram(plan, rays, known)]
+
+
+def _extent(plan: Plan, photos: set[str], at: Floats) -> tuple[Range, Range]:
+    """Return what photos hold: their camera's format, or their points where that is not known."""
+    cameras = cameras_of(plan.document)
+    formats = [held for photo in sorted(photos) if photo in cameras and (held := format_of(cameras[photo]))]
+    corners = np.array([corner for held in formats for corner in held]) if formats else at
+    (a, b), (c, d) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return (a, c), (b, d)
+
+
+def _longer(extent: tuple[Range, Range]) -> float:
+    return max(high - low for low, high in extent)
+
+
+def _scale(v: Floats, longest: float) -> tuple[float, float]:
+    """Return mm in the photo for each micrometre of a vector, and a round length for the bar, µm."""
+    typical = max(float(np.quantile(np.linalg.norm(v, axis=1), SHARE_ON_SCALE)), 1e-3)
+    return longest / typical, nice(typical / 2)
+
+
+def _arrows(at: Floats, v: Floats, factor: float, most: float, kind: str) -> Segments:
+    """Draw vectors, cut at the longest one."""
+    size = np.linalg.norm(v, axis=1, keepdims=True) * factor
+    return Segments(at, at + v * factor * np.minimum(1.0, most / np.maximum(size, 1e-9)), kind)
+
+
+def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
+    rows: dict[str, list[int]] = {}
+    for n in np.flatnonzero(known).tolist():
+        rows.setdefault(rays.photo[n], []).append(n)
+    sizes = {photo: rms(rays.v[[n for n in own if rays.used[n]]]) for photo, own in rows.items()}
+    worst = sorted(rows, key=lambda photo: -sizes[photo])[:MOST_PHOTOS]
+    shown = [photo for photo in rows if photo in worst]
+    crowded = any(len(rows[photo]) > MOST_RAYS for photo in shown)
+    for photo in shown:
+        rows[photo] = sorted(rows[photo], key=lambda n: -float(np.hypot(*rays.v[n])))[:MOST_RAYS]
+    drawn = [n for photo in shown for n in rows[photo]]
+    extent = _extent(plan, set(shown), at[drawn])
+    longest = 0.2 * _longer(extent)
+    factor, bar = _scale(rays.v[[n for n in drawn if rays.used[n]]], longest)
+    hints = {n: f"point {rays.point[n]}: {rays.v[n, 0]:+.1f}, {rays.v[n, 1]:+.1f} µm" for n in drawn}
+    panels = []
+    for photo in shown:
+        used, out = ([n for n in rows[photo] if bool(rays.used[n]) is kept] for kept in (True, False))
+        layers: list[Layer] = [Areas([box(*extent)], "open soft thin")]
+        layers.append(_arrows(at[rows[photo]], rays.v[rows[photo]], factor, 2 * longest, "ink thin"))
+        layers.append(Marks(at[used], "c1", "dot", [hints[n] for n in used], size=3.0))
+        layers += [Marks(at[out], "failed open", "diamond", [hints[n] for n in out], "left out", 3.0)] if out else []
+        panels.append(Map(layers, f"{photo}: {sizes[photo]:.1f} µm", extent))
+    caption = (
+        "Image residuals at their points, measured minus computed, and their rms in each photo. Errors of one point "
+        "stand alone; errors of a photo or camera point the same way side by side."
+    )
+    if crowded:
+        caption += f" Of each photo the {MOST_RAYS} largest are drawn."
+    if len(shown) < len(rows):
+        caption += f" The {len(shown)} of {len(rows)} photos with the largest residuals, in flight order."
+    words = f"{counted(len(rows), 'photo')}; the largest rms is {sizes[worst[0]]:.1f} µm in photo {worst[0]}."
+    bars = [Bar(bar * factor, f"{bar:g} µm")]
+    return chart("image-residuals", ("Image residuals by photo", caption, words), panels, columns=COLUMNS, bars=bars)
+
+
+def _planes(plan: Plan, rays: Rays, at: Floats, used: Flags) -> list[Picture]:
+    cameras = cameras_of(plan.document)
+    rows: dict[str, list[int]] = {}
+    for n in np.flatnonzero(used).tolist():
+        rows.setdefault(cameras[rays.photo[n]]["id"], []).append(n)
+    shown = {name: rows[name] for name in list(rows)[:CAMERAS]}
+    extents = {name: _extent(plan, {rays.photo[n] for n in own}, at[own]) for name, own in shown.items()}
+    cells = {name: _cells(at[own], rays.v[own], _longer(extents[name]) / CELLS) for name, own in shown.items()}
+    means = np.concatenate([cell[:, 2:4] for cell in cells.values()])
+    if not len(means):
+        return []
+    panels = []
+    for name, cell in cells.items():
+        cell_size = _longer(extents[name]) / CELLS
+        factor, bar = _scale(means, 0.8 * cell_size)
+        hints = [f"{n:.0f} residuals, mean {x:+.2f}, {y:+.2f} µm" for _, _, x, y, n in cell.tolist()]
+        layers: list[Layer] = [Areas([box(*extents[name])], "open soft thin")]
+        layers.append(_arrows(cell[:, :2], cell[:, 2:4], factor, cell_size, "ink"))
+        layers.append(Marks(cell[:, :2], "c1", "dot", hints, size=4.0))
+        panels.append(Map(layers, f"camera {name}", extents[name]))
+    caption = (
+        "Mean image residual in each part of the image plane, over all photos of a camera. Vectors that follow a "
+        "pattern tell of a lens, a film or a plate that the calibration does not describe; those of good photos are "
+        "short and mixed."
+    )
+    longest = float(np.linalg.norm(means, axis=1).max())
+    words = f"{counted(len(shown), 'camera')}; the largest mean is {longest:.2f} µm."
+    factor, bar = _scale(means, 0.8 * _longer(next(iter(extents.values()))) / CELLS)
+    title = "Mean residuals of the image plane"
+    bars = [Bar(bar * factor, f"mean {bar:g} µm")]
+    return [chart("image-plane", (title, caption, words), panels, columns=min(2, len(panels)), bars=bars)]
+
+
+def _cells(at: Floats, v: Floats, size: float) -> Floats:
+    """Return place, mean residual and number of the residuals in each cell that has enough of them, (n, 5)."""
+    _, cell = np.unique(np.floor(at / size), axis=0, return_inverse=True)
+    cell, columns = cell.ravel(), np.column_stack([at, v])
+    count = np.bincount(cell)
+    means = np.column_stack([np.bincount(cell, column) / count for column in columns.T])
+    return np.column_stack([means, count])[count >= LEAST_IN_CELL]
+
+
+class Sample(NamedTuple):
+    """Residuals and what they were tested against."""
+
+    name: str
+    values: Floats
+    unit: str
+    sigma: float
+    limits: list[float]  # none: not tested
+
+    @property
+    def reach(self) -> float:
+        """Return what the axis holds, to both sides."""
+        return max(LEAST_REACH * self.sigma, 1.1 * max(self.limits, default=0.0)) or 1.0
+
+
+def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:
+    """Draw the residuals of a bundle standardised; of strips in µm, beside the y parallaxes that were tested."""
+    document, used = plan.document, known & rays.used
+    tested = rays.test[used]
+    tested = tested[np.isfinite(tested).all(axis=1)].ravel()
+    sizes = rays.v[used].ravel()
+    caption = (
+        "How the image residuals are distributed, each over its own standard deviation, with the limits of the search "
+        "for gross errors."
+    )
+    if len(tested):
+        limits = [document["bundle"]["screening"]["limit"]]
+        samples = [Sample("image residuals", tested, "standard deviations", 1.0, limits)]
+    else:
+        samples = [Sample("image residuals", sizes, "µm", rms(sizes), []), *_parallaxes(document)]
+        caption = (
+            "How the image residuals are distributed. They are smaller than the errors of the measurements, of which "
+            "the orientations took up a part; gross errors were sought in the y parallaxes of the pairs, not here."
+        )
+    for sample in samples[1:]:
+        low, high = min(sample.limits), max(sample.limits)
+        caption += (
+            " On the right the y parallaxes of the points used, and the limit beyond which a point of ordinary "
+            f"redundancy is taken out: {median(sample.limits):.1f} µm in the median of the pairs, {low:.1f} to "
+            f"{high:.1f} µm."
+        )
+    beyond = sum(int((np.abs(sample.values) > sample.reach).sum()) for sample in samples)
+    if beyond:
+        caption += (
+            f" {counted(beyond, 'residual')} beyond the axis {'is' if beyond == 1 else 'are'} counted at its ends."
+        )
+    panels = [_classes(sample, sample.name if len(samples) > 1 else "") for sample in samples]
+    words = "Distribution of the residuals", caption, " ".join(map(_tails, samples))
+    return chart("histogram", words, panels, columns=len(panels), height=240.0)
+
+
+def _parallaxes(document: Document) -> list[Sample]:
+    """Return the y parallaxes of the points used, with the limits of their pairs; nothing without either."""
+    limits = [row["limit_um"] for row in document["models"] if row.get("limit_um") is not None]
+    parallaxes = document["parallaxes"]
+    values = parallaxes["q_um"][parallaxes["used"] & np.isfinite(parallaxes["q_um"])]
+    if not limits or not len(values):
+        return []
+    return [Sample("y parallaxes of the pairs", values, "µm", rms(values), limits)]
+
+
+def _classes(sample: Sample, title: str) -> Panel:
+    """Draw the counts of classes with the normal curve and the limits."""
+    reach, unit = sample.reach, " µm" if sample.unit == "µm" else ""
+    edges = np.linspace(-reach, reach, BARS + 1)
+    counts = np.histogram(np.clip(sample.values, -reach, reach), edges)[0]
+    x = np.linspace(-reach, reach, 121)
+    sigma = sample.sigma or 1.0
+    curve = len(sample.values) * (edges[1] - edges[0]) * np.exp(-((x / sigma) ** 2) / 2) / (sigma * np.sqrt(2 * np.pi))
+    high = 1.08 * float(max(counts.max(), curve.max()))
+    layers: list[Layer] = []
+    if sample.limits and max(sample.limits) > min(sample.limits):
+        ends = min(sample.limits), max(sample.limits)
+        boxes = [box((-ends[1], -ends[0]), (0.0, high)), box(ends, (0.0, high))]
+        layers.append(Areas(boxes, "area failed", words="all limits"))
+    columns = [n for n in range(BARS) if counts[n]]
+    boxes = [box((float(edges[n]), float(edges[n + 1])), (0.0, float(counts[n]))) for n in columns]
+    layers.append(Areas(boxes, "column", [counted(int(counts[n]), "residual") for n in columns], "residuals"))
+    layers.append(Line(np.column_stack([x, curve]), "c2", f"normal curve, σ = {sigma:.3g}{unit}"))
+    if sample.limits:
+        limit = median(sample.limits)
+        words = f"median limit ±{limit:.1f} µm" if unit else f"rejected beyond ±{limit:.2f}"
+        foot, head = (np.array([(-limit, y), (limit, y)]) for y in (0.0, high))
+        layers.append(Segments(foot, head, "failed dashed", words=words))
+    return Panel(layers, title, (f"residual, {sample.unit}", "number"), (-reach, reach), (0.0, high))
+
+
+def _tails(sample: Sample) -> str:
+    three = int((np.abs(sample.values) > 3 * sample.sigma).sum())
+    chance = 2 * NormalDist().cdf(-3.0) * len(sample.values)
+    return (
+        f"{len(sample.values)} {sample.name.split(' of ')[0]}, {three} beyond three standard deviations; "
+        f"{chance:.1f} would be by chance."
+    )

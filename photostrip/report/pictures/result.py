@@ -1,0 +1,47 @@
+"""All pictures of a result; what it does not hold has no picture."""
+
+from __future__ import annotations
+
+from photostrip.notes import Document
+from photostrip.report.pictures.along import deformation_pictures, precision_pictures
+from photostrip.report.pictures.check import check_pictures
+from photostrip.report.pictures.footprints import footprint_pictures
+from photostrip.report.pictures.parallaxes import parallax_pictures
+from photostrip.report.pictures.places import plan_of
+from photostrip.report.pictures.plan import plan_picture, precision_maps
+from photostrip.report.pictures.residuals import residual_pictures
+from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.ties import tie_pictures
+
+SECTIONS = {
+    "parallaxes": "relative",
+    "precision": "precision",
+    "precision-plan": "precision",
+    "precision-height": "precision",
+    "deformation": "control",
+    "check": "check",
+    "image-residuals": "images",
+    "image-plane": "images",
+    "histogram": "images",
+}
+"""Sections of the report to which pictures belong, as ``--section`` names them; the others are of the ground."""
+
+
+def pictures_of(document: Document) -> list[Picture]:
+    plan = plan_of(document)
+    return [
+        plan_picture(plan),
+        *footprint_pictures(plan),
+        *tie_pictures(plan),
+        *parallax_pictures(document),
+        *precision_pictures(document),
+        *precision_maps(plan),
+        *deformation_pictures(plan),
+        *check_pictures(document),
+        *residual_pictures(plan),
+    ]
+
+
+def picture_files(document: Document) -> dict[str, str]:
+    """Return the pictures of a result as SVG files, content by file name."""
+    return {f"{picture.name}.svg": picture.file() for picture in pictures_of(document)}

@@ -1,1 +1,0 @@
-"""Pictures of a result, on the page of its report and as files: from its document alone; ``pictures`` has them all."""

@@ -1,0 +1,249 @@
+"""A sheet: what a computation answers, described once; text, Markdown, HTML, JSON and CSV follow from it.
+
+The form of a number says its unit and its decimals: ``"m 3"``, with a sign ``"m +3"``, by digits ``"mm g9"``, as a
+power ``"mm² e4"``; ``"ratio 2"`` has no unit. JSON and CSV have a few more than print.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photostrip.formats.output.csv_text import to_csv
+from photostrip.notes import Document
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.text import to_markdown, to_text
+
+MORE_DECIMALS, MORE_DIGITS = 3, 4  # of JSON and CSV, that are not printed
+PRINTED = {"um": "µm", "arcsec": "″", "arcmin": "′", "percent": "%", "ratio": ""}  # units
+
+
+class Cell(NamedTuple):
+    """A value that is printed in its own way."""
+
+    text: str
+    value: Any  # in JSON and CSV
+
+
+def written(value: Any, form: str = "") -> str:  # noqa: ANN401 (whatever stands in a cell)
+    """Return a value as it is printed, without its unit."""
+    if isinstance(value, Cell | str):
+        return value if isinstance(value, str) else value.text
+    if isinstance(value, list | tuple | np.ndarray):
+        return " ".join(written(each, form) for each in value)
+    if isinstance(value, bool | np.bool):
+        return "yes" if value else "no"
+    if value is None or not isfinite(value):
+        return DASH
+    spec = form.rpartition(" ")[2] if " " in form else ""
+    if not spec:
+        return str(value)
+    return f"{value:.{spec[1:]}{spec[0]}}" if spec[0] in "eg" else f"{value:{spec.rstrip('0123456789')}z.{int(spec)}f}"
+
+
+def plain(value: Any, form: str = "") -> Any:  # noqa: ANN401 (the same)
+    """Return a value as JSON has it: rounded, None for what is no number."""
+    if isinstance(value, Cell):
+        value = value.value
+    if isinstance(value, dict):
+        return {key: plain(each, form) for key, each in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(each, form) for each in value]
+    number = value.item() if isinstance(value, np.generic) else value
+    if not isinstance(number, float) or " " not in form:
+        return None if isinstance(number, float) and not isfinite(number) else number
+    spec = form.rpartition(" ")[2]
+    found = (
+        float(f"{number:.{int(spec[1:]) + MORE_DIGITS}g}")
+        if spec[0] in "eg"
+        else round(number, int(spec) + MORE_DECIMALS)
+    )
+    return found + 0.0 if isfinite(found) else None
+
+
+def with_unit(value: Any, form: str) -> str:  # noqa: ANN401 (the same)
+    """Return a number as it is printed, with its unit."""
+    name = form.rpartition(" ")[0]
+    unit = PRINTED.get(name, name)
+    return written(value, form) + (f" {unit}" if unit and unit not in "″′" else unit)
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A label with its value; without a form or a text of its own it stands in JSON alone."""
+
+    key: str
+    value: Any
+    form: str = ""
+    text: str = ""
+    label: str = ""
+
+    @property
+    def shown(self) -> str:
+        return self.text or (with_unit(self.value, self.form) if self.form else "")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A column: its key in JSON and CSV, the form of its numbers, its head in print; empty for words."""
+
+    key: str
+    form: str = ""
+    head: str | None = None  # None: the key
+    below: str | None = None  # second line of the head; None: the unit
+    rank: int = 0
+    shown: bool = True
+
+    @property
+    def name(self) -> str:
+        return self.key.replace("_", " ") if self.head is None else self.head
+
+    @property
+    def unit(self) -> str:
+        unit = self.form.rpartition(" ")[0]
+        return PRINTED.get(unit, unit)
+
+    @property
+    def column(self) -> Column:
+        return Column(self.name, self.unit if self.below is None else self.below, left=not self.form, rank=self.rank)
+
+
+def hidden(*keys: str, form: str = "") -> tuple[Field, ...]:
+    """Return columns that stand in JSON and CSV alone."""
+    return tuple(Field(key, form, shown=False) for key in keys)
+
+
+def fields(keys: str, form: str, heads: str = "", below: str | None = None, rank: int = 0) -> tuple[Field, ...]:
+    """Return columns of the same form; blanks between keys and heads, a low line within a head."""
+    names: Sequence[str | None] = [each.replace("_", " ") for each in heads.split()] or [None] * len(keys.split())
+    return tuple(Field(key, form, name, below, rank) for key, name in zip(keys.split(), names, strict=True))
+
+
+def _parts(said: Sequence[str | Part]) -> tuple[Part, ...]:
+    return tuple(Words(each) if isinstance(each, str) else each for each in said)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A table; without a title it goes on with the section before. Tables of one key are one table in JSON and CSV."""
+
+    key: str  # empty: printed only
+    title: str
+    fields: Sequence[Field]
+    rows: Sequence[Sequence[Any]]
+    note: str = ""
+    above: Sequence[str | Part] = ()  # what stands above the table, and below it
+    below: Sequence[str | Part] = ()
+    # a column whose values become columns, and those that become a table each, their heads the titles; a single column
+    # of numbers that is left runs upwards
+    across: str = ""
+    tables: Sequence[str] = ()
+    most: int = 0  # columns that are shown of many, evenly
+
+    def sections(self) -> Iterator[Section]:
+        if self.across:
+            yield from map(self._turned, self.tables)
+            return
+        shown = [(place, each) for place, each in enumerate(self.fields) if each.shown]
+        cells = tuple(tuple(written(row[place], each.form) for place, each in shown) for row in self.rows)
+        table: list[Part] = (
+            [Table(tuple(each.column for _, each in shown), cells, note=self.note)] if cells and shown else []
+        )
+        said = [
+            tuple(Words(each) if isinstance(each, str) else each for each in one) for one in (self.above, self.below)
+        ]
+        if table or any(said):
+            yield Section(self.title, (*said[0], *table, *said[1]))
+
+    def _turned(self, name: str) -> Section:
+        """Arrange the values of a column as they lie in a plane."""
+        place = {each.key: number for number, each in enumerate(self.fields)}
+        value, across = self.fields[place[name]], self.fields[place[self.across]]
+        index = [each for each in self.fields if each.shown and each.key not in {*self.tables, self.across}]
+        heads = list(dict.fromkeys(row[place[self.across]] for row in self.rows))
+        lines: dict[tuple[Any, ...], dict[Any, str]] = {}
+        for row in self.rows:
+            line = lines.setdefault(tuple(row[place[each.key]] for each in index), {})
+            line[row[place[self.across]]] = written(row[place[name]], value.form)
+        if self.most and heads:
+            heads = [*heads[: -1 : -(-len(heads) // self.most)], *heads[-1:]]
+        order = sorted(lines, reverse=True) if len(index) == 1 and index[0].form else lines
+        cells = tuple(
+            (*(written(at, each.form) for at, each in zip(key, index, strict=True)), *(lines[key][at] for at in heads))
+            for key in order
+        )
+        columns = (*(each.column for each in index), *(Column(written(at, across.form)) for at in heads))
+        return Section(value.name, (Table(columns, cells, note=self.note),))
+
+    def plain(self) -> list[Document]:
+        return [
+            {each.key: plain(value, each.form) for each, value in zip(self.fields, row, strict=True) if each.key}
+            for row in self.rows
+        ]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Facts and tables under a title."""
+
+    kind: str
+    title: str
+    facts: Sequence[Fact]
+    tables: Sequence[Rows]
+    main: str = ""  # key of the table that is the CSV; empty: the first
+    words: Sequence[Words] = ()  # before the facts
+
+    def sections(self) -> tuple[Section, ...]:
+        """Return the sheet as it is printed."""
+        facts = tuple((each.label or each.key.replace("_", " "), each.shown) for each in self.facts if each.shown)
+        first: list[Part] = [*self.words, Facts(facts)] if facts else [*self.words]
+        found = [Section("", tuple(first))]
+        for section in (each for rows in self.tables for each in rows.sections()):
+            if section.title:
+                found.append(section)
+            else:
+                found[-1] = Section(found[-1].title, (*found[-1].parts, *section.parts))
+        return tuple(each for each in found if each.parts)
+
+    def document(self) -> Document:
+        """Return the sheet as JSON has it: facts by their keys, tables as lists of records, units of their columns."""
+        found: Document = {"kind": self.kind} | {each.key: plain(each.value, each.form) for each in self.facts}
+        units: Document = {}
+        for table in self.tables:
+            if table.key:
+                found.setdefault(table.key, []).extend(table.plain())
+                units |= {table.key: {each.key: each.unit for each in table.fields if each.unit}}
+        return found | {"units": {key: value for key, value in units.items() if value}}
+
+    def csv(self) -> str:
+        """Return the main table as CSV."""
+        parts = [each for each in self.tables if each.key == (self.main or self.tables[0].key)]
+        names = [each.key for each in parts[0].fields if each.key]
+        return to_csv(names, (row.values() for each in parts for row in each.plain()))
+
+    def rendered(self, form: str) -> str:
+        """Return the sheet as a file holds it: ``text``, ``md``, ``html``, ``json`` or ``csv``."""
+        from photostrip.formats.output.result_json import to_json
+
+        if form == "json":
+            return to_json(self.document())
+        if form == "csv":
+            return self.csv()
+        if form == "html":
+            from photostrip import __version__
+            from photostrip.report.html import sections_html
+
+            return sections_html(self.title, __version__, self.sections())
+        return (to_markdown if form == "md" else to_text)(self.title, self.sections())
+
+
+def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:
+    """Return the rows of columns; a column of two dimensions counts as several."""
+    arrays = [np.asarray(each) for each in columns]
+    flat = [part.tolist() for each in arrays for part in (each.T if each.ndim > 1 else [each])]
+    return list(zip(ids, *flat, strict=True))
