@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photostrip.comparison.quantities import name_of
+from photostrip.comparison.quantities import names_of
 from photostrip.notes import Document
 
 # What is ours, what the other numbers are made of, and what is made of them.
@@ -19,6 +19,7 @@ LEFT_OUT = (
     "fiducial_marks",
 )
 
+WORDS = {"photos": "photo", "points": "point", "control": "given point", "strips": "strip", "models": "model"}
 Member = tuple[str, str, str]  # block, id, what it is
 
 
@@ -38,11 +39,9 @@ def _plain(member: Member) -> Document:
 
 
 def _ids(document: Document) -> Iterator[Member]:
-    for block, word in (("photos", "photo"), ("points", "point"), ("control", "given point"), ("strips", "strip")):
-        for row in document[block]:
-            yield block, row["id"], f"{word} {row['id']}"
-    for model in document["models"]:
-        yield "models", name_of("models", model), f"model {name_of('models', model)}"
+    for block, word in WORDS.items():
+        for name in names_of(document[block]):
+            yield block, name, f"{word} {name}"
 
 
 def _choices(document: Document) -> Iterator[Member]:

@@ -29,6 +29,8 @@ class Quantity:
     unit_key: str = ""  # key of the same block or table that names the unit
     many: bool = False  # whether a list of such values stands there
     optional: bool = False  # whether it may be missing, where a kind of project does not have it
+    # kind of tolerance by which two results are compared; name: a column that names its rows; empty: not compared
+    compared: str = ""
 
     @classmethod
     def of(cls, form: str, meaning: str) -> Quantity:
@@ -74,8 +76,8 @@ def _everything() -> Block:
             for place in places:
                 place.optional = line.endswith("?")
         elif line and not line.startswith("#"):
-            keys, form, meaning = line.split(" | ")
-            entry = replace(Quantity.of(form, meaning), optional=keys.endswith("?"))
+            keys, form, meaning, *compared = line.split(" | ")
+            entry = replace(Quantity.of(form, meaning), optional=keys.endswith("?"), compared="".join(compared))
             for path in _expanded(keys.removesuffix("?")):
                 above, _, last = path.rpartition(".")
                 for place in places:
