@@ -4,7 +4,7 @@ Errors are those of all adjusted points that are not control, root mean square o
 along the strip (X), across it (Y) and up (Z). Beside the polynomials stands the bundle adjustment of the same
 measurements, which tests hold beside Ceres: it shows what the measurements hold.
 
-Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length long] [--workers N] [--longest N]
+Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length] [--workers N]
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import sys
 import time
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
@@ -49,49 +48,30 @@ if TYPE_CHECKING:
 SIGMA = 5e-6 * 10_000  # metres: 5 micrometres at the photo scale 1:10 000
 CONTROL_SIGMA = (0.02, 0.02, 0.02)  # metres, stated and real
 SIMILARITY, AUTO, BUNDLE = "similarity", "auto", "bundle"
-FIXED = (SIMILARITY, "2", "3")
-CHOICES = (*FIXED, AUTO)
+CHOICES = (SIMILARITY, "2", "3", AUTO)
+POINTS = Points(5, 75.0, 25.0, 2)  # five rows across the flight at each nadir, and two more in each model
 TITLES = {SIMILARITY: "similarity", "2": "degree 2", "3": "degree 3", AUTO: "auto", BUNDLE: "bundle"}
-AUTO_LIMIT = 1.10  # auto against the best fixed choice
 
 
 # ------------------------------------------------------------------------------------------- which strips
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Points of a photo: rows across the flight at each nadir, and further points anywhere in the models."""
-
-    title: str
-    rows: int = 5
-    more: int = 2
-
-    @property
-    def points(self) -> Points:
-        """The same for the simulation."""
-        return Points(self.rows, 75.0, 25.0, self.more)
-
-
-USUAL = Layout("5 rows and 2 more")
-SPARSE = Layout("5 rows", more=0)
-
-
-def strip(models: int, bands: int, layout: Layout = USUAL, *, every: int | None = None) -> Spec:
+def strip(models: int, bands: int, *, every: int | None = None) -> Spec:
     """Specify a film strip of case (a): f = 153 mm, 1:10 000, 64 % overlap, bands of three control points."""
     return Spec(
         camera=FILM,
         flight=Flight(photos=models + 1, end_lap_percent=64.0),
-        points=layout.points,
+        points=POINTS,
         control=Control(bands=bands, every=every, per_band=3, sigma=CONTROL_SIGMA),
     )
 
 
-def pairs_of_control(photos: int, layout: Layout = USUAL) -> Spec:
+def pairs_of_control(photos: int) -> Spec:
     """Specify a film strip of case (b): f = 153.124 mm, 60 % overlap, two control points every five models."""
     return Spec(
         camera=replace(FILM, principal_distance=153.124),
         flight=Flight(photos=photos, end_lap_percent=60.0),
-        points=layout.points,
+        points=POINTS,
         control=Control(every=5, per_band=2, sigma=CONTROL_SIGMA),
     )
 
@@ -222,30 +202,6 @@ def verdict(values: Floats, doubt: Floats, limits: Floats) -> str:
     return "open" if (above <= 2.0 * doubt).all() else "no"
 
 
-def best_fixed(found: dict[str, Measured]) -> Floats:
-    """Smallest rms in plan and in height over the fixed choices, metres."""
-    best: Floats = np.min([found[choice].plan_height for choice in FIXED if choice in found], axis=0)
-    return best
-
-
-def print_auto(rows: Iterable[tuple[str, dict[str, Measured]]]) -> None:
-    """Print how far auto stays behind the best fixed choice."""
-    lines = []
-    for title, found in rows:
-        ratio = found[AUTO].plan_height / best_fixed(found)
-        lines.append(
-            (
-                title,
-                slashed(found[AUTO].plan_height, 3),
-                slashed(best_fixed(found), 3),
-                slashed(ratio),
-                "yes" if (ratio <= AUTO_LIMIT).all() else "no",
-            )
-        )
-    print(f"auto against the best fixed choice, plan/height, m (limit {AUTO_LIMIT:.2f})")
-    table(("strip", "auto", "best fixed", "ratio", "within"), lines)
-
-
 # --------------------------------------------------------------------------------------------- the cases
 
 CASES_A = (
@@ -261,20 +217,16 @@ def case_a(pool: Pool, seeds: int) -> None:
     """Bands of three control points: X/Y/Z in units of sigma at photo scale, against limits."""
     print(f"(a) f 153 mm, 1:10 000, 64 % overlap, bands of 3 control points (2 cm), 5 um; {seeds} strips of each kind")
     print("    rms along/across/up at points that are not control, in units of 5 um at photo scale = 0.05 m\n")
-    rows, autos = [], []
-    for layout in (USUAL, SPARSE):
-        for models, bands in dict.fromkeys(case[:2] for case in CASES_A):
-            found = measure(pool, strip(models, bands, layout), seeds, (*CHOICES, BUNDLE))
-            title = f"{models} models, {bands} bands, {layout.title}"
-            autos.append((title, found))
-            for _, _, choice, limits in (case for case in CASES_A if case[:2] == (models, bands)):
-                of, limit = found[choice], np.array(limits)
-                values, doubt = of.rms / SIGMA, of.doubt / SIGMA
-                head = (title, f"{of.per_model:.1f}", TITLES[choice], slashed(limits, 1), slashed(values))
-                tail = (slashed(values / limit), verdict(values, doubt, limit), slashed(found[BUNDLE].rms / SIGMA))
-                rows.append((*head, slashed(doubt), *tail))
+    rows = []
+    for models, bands in dict.fromkeys(case[:2] for case in CASES_A):
+        found = measure(pool, strip(models, bands), seeds, (*CHOICES, BUNDLE))
+        for _, _, choice, limits in (case for case in CASES_A if case[:2] == (models, bands)):
+            of, limit = found[choice], np.array(limits)
+            values, doubt = of.rms / SIGMA, of.doubt / SIGMA
+            head = (f"{models} models, {bands} bands", f"{of.per_model:.1f}", TITLES[choice], slashed(limits, 1))
+            tail = (slashed(values / limit), verdict(values, doubt, limit))
+            rows.append((*head, slashed(values), slashed(doubt), *tail, slashed(found[BUNDLE].rms / SIGMA)))
     table(("strip", "per model", "adjustment", "limit", "measured", "s.e.", "ratio", "below", "bundle"), rows)
-    print_auto(autos)
 
 
 def case_b(pool: Pool, seeds: int) -> None:
@@ -286,28 +238,24 @@ def case_b(pool: Pool, seeds: int) -> None:
     print(
         "    the limit of the bundle is what another one reached; on the right both columns divided by their bundle\n"
     )
-    rows, autos = [], []
-    for layout in (USUAL, replace(SPARSE, title="5 rows and 1 more", more=1), SPARSE):
-        found = measure(pool, pairs_of_control(20, layout), seeds, (*CHOICES, BUNDLE))
-        autos.append((layout.title, found))
-        rigorous = found[BUNDLE].plan_height
-        for choice, limits in LIMITS_B.items():
-            of, limit = found[choice], np.array(limits)
-            values, doubt = of.plan_height, of.plan_height_doubt
-            head = (layout.title, f"{of.per_model:.1f}", TITLES[choice], slashed(limits, 3), slashed(values, 3))
-            tail = (slashed(limit / LIMITS_B[BUNDLE]), slashed(values / rigorous))
-            below = "-" if choice == BUNDLE else verdict(values, doubt, limit)
-            rows.append((*head, slashed(doubt, 3), slashed(values / limit), below, *tail))
-    heads = ("points", "per model", "adjustment", "limit", "measured", "s.e.", "ratio", "below")
+    rows = []
+    found = measure(pool, pairs_of_control(20), seeds, (*CHOICES, BUNDLE))
+    for choice, limits in LIMITS_B.items():
+        of, limit = found[choice], np.array(limits)
+        values, doubt = of.plan_height, of.plan_height_doubt
+        below = "-" if choice == BUNDLE else verdict(values, doubt, limit)
+        head = (TITLES[choice], f"{of.per_model:.1f}", slashed(limits, 3), slashed(values, 3), slashed(doubt, 3))
+        tail = (slashed(limit / LIMITS_B[BUNDLE]), slashed(values / found[BUNDLE].plan_height))
+        rows.append((*head, slashed(values / limit), below, *tail))
+    heads = ("adjustment", "per model", "limit", "measured", "s.e.", "ratio", "below")
     table((*heads, "limit/bundle", "measured/bundle"), rows)
-    print_auto(autos)
 
 
 def case_length(pool: Pool, seeds: int) -> None:
     """Print a table over lengths and bands."""
     print(f"(length) strips as in (a), {seeds} of each kind; rms along/across/up in units of 5 um at photo scale")
     print("    -: the control does not carry that degree; took: degrees in plan/height that auto took most often\n")
-    rows, autos = [], []
+    rows = []
     for models, bands in product((6, 10, 14, 20, 30, 40), (2, 3, 4, 5, 0)):
         if models <= 20 and not bands:
             continue  # the same as one of the others
@@ -316,37 +264,16 @@ def case_length(pool: Pool, seeds: int) -> None:
             if found[choice].degree != (int(choice), int(choice)):
                 del found[choice]
         title = f"{models:2d} models, {f'{bands} bands' if bands else 'every 5'}"
-        autos.append((title, found))
         cells = [slashed(found[c].rms / SIGMA, 1) if c in found else "-" for c in (*CHOICES, BUNDLE)]
         ratio = found[AUTO].plan_height / found[BUNDLE].plan_height
         rows.append((title, *cells[:-1], "{}/{}".format(*found[AUTO].degree), cells[-1], slashed(ratio, 1)))
     table(("strip", *(TITLES[c] for c in CHOICES), "took", "bundle", "auto/bundle"), rows)
-    print_auto(autos)
-
-
-LONG = (10, 20, 30, 40, 60, 100)  # photos
-
-
-def case_long(pool: Pool, seeds: int, longest: int = LONG[-1]) -> None:
-    """Print how polynomials fall behind a bundle on long strips."""
-    print("(long) strips as in (b), two control points every 5 models; rms in plan/height, m, and the same divided by")
-    print(f"    that of the bundle; {seeds} strips up to 20 photos, fewer of longer ones\n")
-    rows = []
-    for photos in (size for size in LONG if size <= longest):
-        count = max(2, min(seeds, seeds * 20 // photos))
-        found = measure(pool, pairs_of_control(photos), count, (*CHOICES, BUNDLE))
-        cells = [slashed(found[choice].plan_height, 3) for choice in (*CHOICES, BUNDLE)]
-        ratios = [slashed(found[choice].plan_height / found[BUNDLE].plan_height, 1) for choice in CHOICES]
-        rows.append((f"{photos} photos", *cells, *ratios))
-    heads = [TITLES[choice] for choice in (*CHOICES, BUNDLE)]
-    table(("strip", *heads, *(f"{TITLES[choice]}/b." for choice in CHOICES)), rows)
 
 
 CASES: dict[str, Callable[[Pool, int], None]] = {
     "a": case_a,
     "b": case_b,
     "length": case_length,
-    "long": case_long,
 }
 
 
@@ -356,13 +283,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20, help="strips of each kind (default 20; 200 for firm numbers)")
     parser.add_argument("--cases", nargs="+", choices=CASES, default=["a", "b", "length"], help="tables to print")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
-    parser.add_argument("--longest", type=int, default=LONG[-1], help="photos of the longest strip of the case long")
     options = parser.parse_args()
-    cases = CASES | {"long": partial(case_long, longest=options.longest)}
     with get_context("spawn").Pool(options.workers) as pool:
         for case in options.cases:
             start = time.perf_counter()
-            cases[case](pool, options.seeds)
+            CASES[case](pool, options.seeds)
             print(f"case {case}: {time.perf_counter() - start:.0f} s", file=sys.stderr)
 
 

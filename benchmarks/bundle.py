@@ -3,7 +3,7 @@
 Every program gets the same arrays and the same start in the same process, one thread each, one after the other in each
 round; times are those of the processor, medians of the rounds. Without the two packages only our own times are printed.
 
-Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block corridor memory] [--largest N] [--alone]
+Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block] [--largest N] [--alone]
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import os
 import sys
 import time
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,7 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from benchmarks import peers  # noqa: E402
+from benchmarks.accuracy import table  # noqa: E402
 from photostrip.network.adjustment import solve  # noqa: E402
 from photostrip.network.cofactors import cofactors_of  # noqa: E402
 from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
@@ -38,9 +38,7 @@ if TYPE_CHECKING:
     from photostrip.network.problem import BundleProblem
 
 LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}
-LARGEST_MEMORY = 350.0  # MB, at 1000 photos with 300 points each
 EXTRA = {False: 0.41, True: 0.256}  # points of a model for each point of a photo, in a strip and in a block
-MEGABYTE = 1024.0
 SHIFT, TURN = 0.5, 1e-3  # metres and radians, of all start values
 
 
@@ -65,7 +63,6 @@ CASES = {
     "large": STRIPS[-1:],
     "block": [Case(20, 50, 40)],
 }
-LONG = [Case(1, photos, 40) for photos in (1000, 3000, 10_000)]
 
 
 def problem(case: Case) -> BundleProblem:
@@ -188,74 +185,11 @@ def _print_ratios(ratios: Sequence[tuple[Case, Times]]) -> None:
     table(("photos", "to Ceres", "to its solver", "to COLMAP", "covariances", "within"), lines)
 
 
-# --------------------------------------------------------------------------------------------- growth and memory
-
-
-def corridor(cases: Iterable[Case], rounds: int) -> None:
-    """Print how time grows with the length of a strip."""
-    lines: list[tuple[str, ...]] = []
-    shortest = 0.0
-    for case in cases:
-        given = problem(case)
-        solve(given)
-        own, more = np.median([timed(given)[:2] for _ in range(rounds)], axis=0).tolist()
-        per = 1e6 * own / len(given.images)
-        shortest = per if not lines else shortest
-        lines.append(
-            (
-                case.title,
-                str(len(given.images)),
-                f"{1000.0 * own:.0f}",
-                f"{1000.0 * more:.0f}",
-                f"{per:.2f}",
-                f"{per / shortest:.2f}",
-            )
-        )
-    print("long corridors: milliseconds, and microseconds for each ray")
-    table(("photos", "rays", "solve", "covariances", "per ray", "to the first"), lines)
-
-
-def _peak(given: BundleProblem) -> tuple[float, float]:
-    """Peak memory of a process that adjusts a problem, MB: all of it, and what it had before, the arrays included."""
-    import resource
-
-    import scipy.linalg.lapack  # noqa: F401
-
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
-    cofactors_of(solve(given))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE, before
-
-
-def memory() -> None:
-    """Print the peak memory of a process of its own."""
-    case = STRIPS[-1]
-    with get_context("spawn").Pool(1) as pool:
-        peak, before = pool.apply(_peak, (problem(case),))
-    verdict = "yes" if peak <= LARGEST_MEMORY else "no"
-    print(f"peak memory of a process that adjusts {case.title} with all covariances, MB (limit {LARGEST_MEMORY:.0f})")
-    table(("before", "peak", "within"), [(f"{before:.0f}", f"{peak:.0f}", verdict)])
-
-
-# ------------------------------------------------------------------------------------------------------ printing
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print columns, the first to the left, the others to the right."""
-    lines = [tuple(head), *map(tuple, rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    lines.insert(1, tuple("-" * width for width in widths))
-    for first, *others in lines:
-        cells = [cell.rjust(width) for cell, width in zip(others, widths[1:], strict=True)]
-        print("  ".join([first.ljust(widths[0]), *cells]).rstrip())
-    print(flush=True)
-
-
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=5, help="rounds of which medians are taken")
-    names = [*CASES, "corridor", "memory"]
-    parser.add_argument("--cases", nargs="*", choices=names, default=names, help="which tables to print")
+    parser.add_argument("--cases", nargs="*", choices=CASES, default=[*CASES], help="which tables to print")
     parser.add_argument("--largest", type=int, default=100_000, help="photos of the largest strip to adjust")
     parser.add_argument("--alone", action="store_true", help="without the other programs")
     wanted = parser.parse_args()
@@ -266,10 +200,6 @@ def main() -> None:
         if name in wanted.cases:
             fitting = [case for case in cases if case.photos <= wanted.largest]
             side_by_side(fitting, wanted.rounds, alone=alone)
-    if "corridor" in wanted.cases:
-        corridor([case for case in LONG if case.photos <= wanted.largest], wanted.rounds)
-    if "memory" in wanted.cases:
-        memory()
     sys.stdout.flush()
     if peers.KEPT:
         os._exit(0)  # what two libraries own together cannot be freed

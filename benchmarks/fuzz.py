@@ -7,9 +7,6 @@ traceback, another exit code than 0, 1, 2 and 3, a changed input, half a result,
 
 ``python benchmarks/fuzz.py blocks [cases] [seed]`` does the same to bundles: two strips, camera positions, given
 orientations, strips of single photos; 5000 cases.
-
-``python benchmarks/fuzz.py results [cases] [seed]`` gives edited results to ``report`` and ``compare`` instead, 2000 of
-them: each is printed, or refused with the name of its file, and no control character reaches the terminal.
 """
 
 from __future__ import annotations
@@ -26,43 +23,11 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
-from tests.edited_results import COMMANDS, edited, faults_of
 from tests.fuzzing import blocks, damaged, emptied, projects, tried
-from tests.reports import RESULT, saved
 
 CASES, SEED = 10_000, 1
-RESULTS = 2000  # edited results
 MEMORY_MB = 600  # of the process, with all cases one after the other
 SHOWN = 10
-
-
-def edited_results(number: int, seed: int) -> int:
-    """Give edited results to ``report`` and ``compare``, and print how many ended as they must not."""
-    begin = time.perf_counter()
-    wrong: list[str] = []
-    with tempfile.TemporaryDirectory() as place:
-        right = Path(place) / "right.json"
-        right.write_bytes(RESULT.read_bytes())
-        for each in range(number):
-            random = Random(f"{seed} {each}")  # noqa: S311 (the same cases every time)
-            wrong += faults_of(edited(saved(), random), right, Path(place), random.choice(COMMANDS))
-    print(f"{number} edited results, seed {seed}, {time.perf_counter() - begin:.0f} s")
-    print(f"wrong: {len(wrong)}", *wrong[:SHOWN], sep="\n  ")
-    return 1 if wrong else 0
-
-
-def main() -> int:
-    """Read what is asked."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", nargs="*", metavar="[blocks|results] CASES SEED", help="projects of strips where "
-                        f"neither is named; {CASES} cases ({RESULTS} results), seed {SEED}")  # fmt: skip
-    what = parser.parse_args().what
-    kind = what.pop(0) if what[:1] in (["blocks"], ["results"]) else ""
-    if len(what) > 2 or not all(each.isdecimal() for each in what):
-        parser.error("numbers are wanted: cases and seed")
-    numbers = [int(each) for each in what]
-    number, seed = [*numbers, *(RESULTS if kind == "results" else CASES, SEED)[len(numbers) :]]
-    return edited_results(number, seed) if kind == "results" else damaged_projects(number, seed, of_blocks=bool(kind))
 
 
 def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
@@ -93,6 +58,20 @@ def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
     print(f"seconds: median {seconds[len(seconds) // 2]:.3f}, largest {seconds[-1]:.3f}")
     print(f"wrong: {len(wrong)}", *wrong[:SHOWN], sep="\n  ")
     return 1 if wrong else 0
+
+
+def main() -> int:
+    """Read what is asked."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("what", nargs="*", metavar="[blocks] CASES SEED", help="projects of strips where blocks "
+                        f"are not named; {CASES} cases, seed {SEED}")  # fmt: skip
+    what = parser.parse_args().what
+    of_blocks = what[:1] == ["blocks"]
+    numbers = what[of_blocks:]
+    if len(numbers) > 2 or not all(each.isdecimal() for each in numbers):
+        parser.error("numbers are wanted: cases and seed")
+    number, seed = [*map(int, numbers), *(CASES, SEED)[len(numbers) :]]
+    return damaged_projects(number, seed, of_blocks=of_blocks)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,16 @@
 """Projects with gross errors: what is found, what is lost, and what the new points are worth afterwards.
 
-Every simulated project is adjusted four times: as it is, with gross errors in 1 to 5 % of its measurements, with the
-errors and without the search for them, and without those measurements and the wrong control (what could be reached at
-best). Errors are from 5 standard deviations to 50 mm (all sizes on a logarithmic scale equally often), along one axis;
-in a third of the projects one control coordinate is wrong too. Kinds: strips of 20 photos, blocks of 4 strips of 12
-photos by bundle (with GNSS and control at the corners of the strips, or with control along the perimeter), and strips
-of 19 independent models, with errors of their points or of their perspective centres, too. ``clean`` are projects of
-all sizes without errors, ``wrong-control`` strips with two fifths of the control wrong, ``another-spot`` strips with a
-control point identified wrongly, ``wrong-photo`` strips with a fifth of the image points of one photo wrong, ``long`` a
-fifth as many strips of 1000 photos with 300 equal errors.
+Every simulated project is adjusted three times: as it is, with gross errors in 1 to 5 % of its measurements, and
+without those measurements and the wrong control (what could be reached at best). Errors are from 5 standard deviations
+to 50 mm (all sizes on a logarithmic scale equally often), along one axis; in a third of the projects one control
+coordinate is wrong too. Kinds: strips of 20 photos, blocks of 4 strips of 12 photos by bundle (with GNSS and control at
+the corners of the strips, or with control along the perimeter), and strips of 19 independent models, with errors of
+their points or of their perspective centres, too.
 
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
 with a wrong measurement of their own are therefore left out of the errors.
 
-Usage: python benchmarks/gross_errors.py [PROJECTS] [--kind KIND] [--searched] [--first-seed N] [--workers N]
+Usage: python benchmarks/gross_errors.py [PROJECTS] [--kind KIND] [--first-seed N] [--workers N]
 """
 
 from __future__ import annotations
@@ -24,7 +21,6 @@ import sys
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,11 +59,8 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of a measurement; micrometres
 WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
-MUCH_SHARE, MUCH_ERRORS, MUCH_POINTS = 0.4, (5.0, 100.0), (14, 20)  # of much wrong control; m; control points
-RUNS = ("without errors", "errors, auto", "errors, none", "errors, known")
-CLEAN, AUTO, NONE, KNOWN = RUNS
-SIZES = {6: 2, 20: 2, 60: 4, 200: 8, 1000: 20, 3000: 30}  # photos of clean projects, and strips of the blocks
-LONG = 60  # photos from which clean projects are fewer
+RUNS = ("without errors", "errors, auto", "errors, known")
+CLEAN, AUTO, KNOWN = RUNS
 
 STRIP = Spec(
     flight=Flight(photos=20, end_lap_percent=62.0),
@@ -75,11 +68,6 @@ STRIP = Spec(
     control=Control(layout="bands", bands=7, per_band=3),
 )
 BLOCK = replace(STRIP, flight=replace(STRIP.flight, photos=12, strips=4))
-SCATTERED = replace(
-    STRIP,
-    flight=replace(STRIP.flight, photos=13),
-    control=Control(layout="random", use={"xy": 0.2, "z": 0.2, "xyz": 0.6}, sigma=(0.02, 0.02, 0.02)),
-)
 KINDS = {
     "strips": STRIP,
     "gnss": replace(BLOCK, control=Control(layout="corners"), gnss=Gnss()),
@@ -106,20 +94,6 @@ class Project:
     def wrong_control(self) -> set[str]:
         """Control points with a wrong coordinate."""
         return {error.point for error in self.simulation.truth.errors if error.kind == "control"}
-
-    @property
-    def along_base(self) -> set[str]:
-        """Image points of points on two photos with an error along the base, which contradicts nothing."""
-        o = self.simulation.observations
-        two = {o.point_ids[number] for number in np.flatnonzero(np.bincount(o.point) == 2)}
-        errors = self.simulation.truth.errors
-        return {f"{e.photo}/{e.point}" for e in errors if e.kind == "image" and e.axis == "x" and e.point in two}
-
-    def without_search(self) -> Settings:
-        """Look for no gross errors."""
-        s = self.settings
-        parts = {name: replace(getattr(s, name), screening="none") for name in ("relative", "links", "bundle")}
-        return replace(s, **parts)
 
     def without(self, wrong: Iterable[str]) -> Settings:
         """Leave measurements out."""
@@ -219,13 +193,8 @@ class Run:
 
     def sound(self, wrong: Iterable[str]) -> Floats:
         """Errors of the points without a wrong measurement of their own."""
-        spoiled = spoiled_points(wrong)
+        spoiled = {name.partition("/")[2] for name in wrong}
         return self.errors[[name not in spoiled for name in self.point]]
-
-
-def spoiled_points(wrong: Iterable[str]) -> set[str]:
-    """Points with a wrong measurement."""
-    return {name.partition("/")[2] for name in wrong}
 
 
 def adjusted(project: Project, settings: Settings) -> Run:
@@ -276,22 +245,20 @@ def taking_part(result: Result, count: int) -> tuple[Flags, Flags]:
     return used, placing
 
 
-def runs_of(kind: str, seed: int, wanted: Sequence[str] = RUNS) -> tuple[Project, dict[str, Run]]:
-    """Adjust one project without errors, with errors, without search, and without the wrong measurements."""
+def runs_of(kind: str, seed: int) -> tuple[Project, dict[str, Run]]:
+    """Adjust one project without errors, with errors, and without the wrong measurements."""
     plain, spoiled = pair_of_projects(kind, seed)
     ways = {
         CLEAN: (plain, plain.settings),
         AUTO: (spoiled, spoiled.settings),
-        NONE: (spoiled, spoiled.without_search()),
         KNOWN: (plain, plain.without(spoiled.wrong)),
     }
     runs = {}
-    for name in wanted:
+    for name in RUNS:
         try:
             runs[name] = adjusted(*ways[name])
         except PhotostripError as error:
-            if name != NONE:
-                print(f"{kind} {seed}, {name}: {error}")
+            print(f"{kind} {seed}, {name}: {error}")
     return spoiled, runs
 
 
@@ -334,22 +301,16 @@ class Tally:
         self.counts.update(f"failed {name}" for name in RUNS if name not in runs)
         self.counts.update(good=len(project.names) - len(project.wrong), wrong=len(project.wrong))
         if CLEAN in runs:
-            self.counts.update(clean=1, touched=loses_anything(project, runs[CLEAN]))
+            lost = len(runs[CLEAN].placing) < len(project.names) or bool(runs[CLEAN].rejected)
+            self.counts.update(clean=1, touched=lost)
         if AUTO in runs:
-            found, spoiled = runs[AUTO], spoiled_points(project.wrong)
+            found = runs[AUTO]
             wrong = project.wrong_control & (found.control | found.image | found.either)
-            placing = found.placing & project.wrong
-            self.counts.update(placing=len(placing), hidden=len(placing & project.along_base), control=len(wrong))
+            self.counts.update(placing=len(found.placing & project.wrong), control=len(wrong))
             false = found.rejected - project.wrong_control
             self.counts.update(named=len(wrong & found.rejected), false=len(false))
-            self.counts.update(misplaced=len(false & spoiled))
-            self.counts.update(image=len(found.image), sound_image=len(found.image - spoiled))
-            self.counts.update(either=len(found.either), either_given=len(found.either & wrong))
-            self.counts.update(either_image=len(found.either & spoiled))
             if KNOWN in runs:
                 self.counts.update(lost=len(runs[KNOWN].used - found.used))
-                unplaced = set(runs[KNOWN].point) - set(found.point) - spoiled
-                self.counts.update(unplaced=len(unplaced))
             self.ratios += [rms[AUTO] / rms[CLEAN]] if CLEAN in runs else []
 
     def rms(self, name: str) -> Floats:
@@ -369,36 +330,20 @@ class Tally:
         return line((title, *ratios, *found, str(c["false"]), f"{c['touched']}/{c['clean']}"))
 
 
-def loses_anything(project: Project, run: Run) -> bool:
-    """Whether a measurement places no point, or control or a camera position is named."""
-    return len(run.placing) < len(project.names) or bool(run.rejected)
-
-
-def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range, wanted: Sequence[str]) -> None:
+def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range) -> None:
     """Print the errors of the new points of every kind of project, then what was found and lost."""
     tallies = {kind: Tally() for kind in kinds}
     print("project    adjusted         rms along  across      up   plan ratio  height ratio   failed", flush=True)
     for kind, tally in tallies.items():
-        for project, runs in pool.imap(partial(runs_of, kind, wanted=wanted), seeds):
+        for project, runs in pool.imap(partial(runs_of, kind), seeds):
             tally.add(project, runs)
-        for name in wanted:
+        for name in RUNS:
             (plan, height), value = tally.ratio(name), tally.rms(name)
             row = f"{kind:11s}{name:16s}{value[0]:10.3f}{value[1]:8.3f}{value[2]:8.3f}{plan:13.3f}{height:14.3f}"
             print(f"{row}{tally.counts[f'failed {name}']:9d}", flush=True)
     print(f"\n{HEAD}")
     for kind, tally in tallies.items():
         print(tally.row(kind))
-    print("\nproject    of those placing a point, along the base of points on two photos")
-    print("           of control named falsely, points with a wrong measurement of their own")
-    print("           points without a wrong measurement that lose their coordinates, and would not by knowledge")
-    for kind, tally in tallies.items():
-        print(f"{kind:11s}{tally.counts['hidden']:32d}{tally.counts['misplaced']:12d}{tally.counts['unplaced']:12d}")
-    print("\nproject    control points left out for an image, of which all images are right")
-    print("           left out for an image or a coordinate, with a wrong image, with a wrong coordinate")
-    for kind, tally in tallies.items():
-        c = tally.counts
-        row = f"{kind:11s}{c['image']:32d}{c['sound_image']:12d}{c['either']:12d}{c['either_image']:6d}"
-        print(f"{row}{c['either_given']:6d}")
     print("\nproject    ratio of a project's rms: median, 95 % below, largest")
     for kind, tally in tallies.items():
         middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)
@@ -406,101 +351,17 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range, wanted: Sequence
     print(flush=True)
 
 
-# ------------------------------------------------------------------------------- without errors, much wrong control
-
-
-def clean_spec(form: str, photos: int, seed: int) -> Spec:
-    """Give a project of any size: a strip, a strip of models, or a block with GNSS."""
-    flight = replace(STRIP.flight, photos=photos, scale=5000.0, heading_deg=0.0)
-    strip = replace(STRIP, flight=flight, control=Control(every=5), seed=seed)
-    if form == "models":
-        return replace(strip, models=Models())
-    if form == "strips":
-        return strip
-    strips = SIZES[photos]
-    flight = replace(flight, photos=photos // strips, strips=strips)
-    return replace(strip, flight=flight, control=Control(layout="corners"), gnss=Gnss())
-
-
-def clean_run(form: str, photos: int, seed: int) -> tuple[bool, bool, bool]:
-    """Whether a project without errors loses measurements, control, camera positions."""
-    project = project_of(simulate(clean_spec(form, photos, seed)))
-    run = adjusted(project, project.settings)
-    lost = len(run.placing) < len(project.names)
-    return lost, bool(run.rejected & run.control), bool(run.rejected - run.control)
-
-
-def print_clean(pool: Pool, seeds: range) -> None:
-    """Print how many projects without gross errors lose anything."""
-    print("without errors   photos   projects   lose measurements   control   positions   anything")
-    for form, photos in product(("strips", "blocks", "models"), SIZES):
-        some = seeds[: max(2, len(seeds) * LONG // max(photos, LONG))]
-        found = np.array(pool.map(partial(clean_run, form, photos), some, 1))
-        counts = "".join(f"{count:12d}" for count in (*found.sum(axis=0), found.any(axis=1).sum()))
-        print(f"{form:16s}{photos:7d}{len(some):11d}{counts}", flush=True)
-    print(flush=True)
-
-
-def much_wrong(control: ControlPoints, rng: np.random.Generator) -> tuple[ControlPoints, Flags]:
-    """Spoil two fifths of the plan positions and of the heights; also which coordinates are wrong."""
-    given, enu, bad = control.use & ~control.check[:, None], control.enu.copy(), np.zeros(control.use.shape, bool)
-    for row in rng.permutation(np.flatnonzero(given.any(axis=1))).tolist():
-        axes = [axis for axis in ([0, 1], [2]) if given[row, axis[0]]]
-        part = axes[rng.integers(len(axes))]
-        if bad[:, part[0]].sum() + 1 <= MUCH_SHARE * given[:, part[0]].sum():
-            error = rng.normal(size=len(part))
-            enu[row, part] += error / np.linalg.norm(error) * np.exp(rng.uniform(*np.log(MUCH_ERRORS)))
-            bad[row, part] = True
-    return replace(control, enu=enu), bad
-
-
-def much_wrong_run(seed: int) -> tuple[int, int, int, int]:
-    """Adjust a strip with much wrong control: wrong coordinates, those named, others named, and 1 for a failure."""
-    rng = np.random.default_rng(seed)
-    spec = replace(SCATTERED, control=replace(SCATTERED.control, count=int(rng.integers(*MUCH_POINTS))), seed=seed)
-    project = project_of(simulate(spec))
-    control, bad = much_wrong(project.inputs.control, rng)
-    try:
-        result = triangulate(replace(project.inputs, control=control), project.settings)
-    except PhotostripError as error:
-        print(f"wrong control {seed}: {error}")
-        return int(bad.sum()), 0, 0, 1
-    (kept,) = (strip.control for strip in result.strips)
-    rows = [control.ids.index(name) for name in kept.ids]
-    bad, out = bad[rows], control.use[rows] & ~kept.use
-    return int(bad.sum()), int((bad & out).sum()), int((out & ~bad).sum()), 0
-
-
-def print_much_wrong(pool: Pool, seeds: range) -> None:
-    """Print how many strips with two fifths of the control wrong lose just that."""
-    wrong, named, others, failed = np.array(pool.map(much_wrong_run, seeds, 1)).T
-    print(f"{MUCH_SHARE:.0%} of the control wrong: {((wrong == named) & (others == 0)).sum()} of {len(seeds)} strips")
-    print(f"lose just that; {named.sum()} of {wrong.sum()} wrong coordinates named, {others.sum()} others;", end=" ")
-    print(f"{failed.sum()} failed\n", flush=True)
-
-
-OTHERS = {
-    "clean": print_clean,
-    "wrong-control": print_much_wrong,
-}
-
-
 def main() -> None:
     """Print the tables that are asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("projects", type=int, nargs="?", default=60, help="projects of each kind (default 60)")
-    parser.add_argument("--kind", choices=[*KINDS, *OTHERS, "all"], default="all")
-    parser.add_argument("--searched", action="store_true", help="leave out the runs without the search")
+    parser.add_argument("--kind", choices=[*KINDS, "all"], default="all")
     parser.add_argument("--first-seed", type=int, default=1, help="number of the first project (default 1)")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.projects)
     with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
-        if kinds := [kind for kind in KINDS if options.kind in {kind, "all"}]:
-            print_kinds(pool, kinds, seeds, [name for name in RUNS if name != NONE or not options.searched])
-        for kind, show in OTHERS.items():
-            if options.kind in {kind, "all"}:
-                show(pool, seeds)
+        print_kinds(pool, [kind for kind in KINDS if options.kind in {kind, "all"}], seeds)
 
 
 if __name__ == "__main__":

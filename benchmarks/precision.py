@@ -4,7 +4,7 @@ One geometry, its image coordinates and control drawn anew many times. Printed i
 divided by the scatter, rms over all points, to the east, to the north and up; then the same of the photos' centres and
 rotations, and the smallest and largest ratio of any single coordinate of a point.
 
-Usage: python benchmarks/precision.py [--repetitions N] [--workers N] [--only NAME ...]
+Usage: python benchmarks/precision.py [--repetitions N] [--workers N]
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import argparse
 import sys
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
-from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +24,6 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
-from photostrip.camera import Camera  # noqa: E402
 from photostrip.pipeline.inputs import Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.pipeline.strips.method import adjust_formed  # noqa: E402
@@ -50,7 +48,6 @@ if TYPE_CHECKING:
 METHODS = ("similarity", "1", "2", "3")
 SIGMA_UM = 5.0
 CHUNKS = 20
-UAV = Camera("uav", 8.8, format=(13.2, 8.8))
 
 
 @dataclass(frozen=True)
@@ -60,34 +57,27 @@ class Case:
     name: str
     photos: int
     bands: int = 4
-    every: int | None = None
     per_band: int = 3
     lap: float = 62.0
     use: tuple[tuple[str, float], ...] = ()
-    sigma: tuple[float, float, float] = (0.05, 0.05, 0.05)
-    relief: float = 60.0
-    uav: bool = False
     layout: str = "bands"
-    extra: int = 2  # points of each model beside the five rows of Gruber points
-    methods: tuple[str, ...] = METHODS
 
     @property
     def spec(self) -> Spec:
         """The same for the simulation."""
         return Spec(
-            camera=replace(UAV) if self.uav else replace(FILM, principal_distance=153.0),
+            camera=replace(FILM, principal_distance=153.0),
             flight=Flight(photos=self.photos, end_lap_percent=self.lap),
-            terrain=Terrain(relief=self.relief),
-            points=Points(rows=5, reach_percent=75.0, extra_per_model=self.extra),
+            terrain=Terrain(relief=60.0),
+            points=Points(rows=5, reach_percent=75.0, extra_per_model=2),
             control=Control(
                 layout=self.layout,
                 bands=self.bands,
-                every=self.every,
                 per_band=self.per_band,
                 use=dict(self.use) or {"xyz": 1.0},
-                sigma=self.sigma,
+                sigma=(0.05, 0.05, 0.05),
             ),
-            image=Image(1.0 if self.uav else SIGMA_UM),
+            image=Image(SIGMA_UM),
         )
 
 
@@ -153,8 +143,8 @@ def displaced(found: tuple[Floats, Floats, Floats], true: tuple[Floats, Floats, 
 def repeated(task: tuple[Case, int, int]) -> dict[str, list[Floats]]:
     """Add up displacements and their squares of points and photos over some repetitions, each strip formed once."""
     case, number, seed = task
-    inputs, wanted = true_inputs(case.spec), {method: settings(method, precision=False) for method in case.methods}
-    first = wanted[case.methods[0]]
+    inputs, wanted = true_inputs(case.spec), {method: settings(method, precision=False) for method in METHODS}
+    first = wanted[METHODS[0]]
     truth = triangulate(inputs, first)
     (strip,) = truth.strips
     frame, measured = strip.intermediate, np.isin(inputs.control.ids, strip.control.ids)
@@ -190,7 +180,7 @@ def scatter(pool: Pool, case: Case, repetitions: int) -> None:
     """Print one kind of strip."""
     tasks = [(case, repetitions // CHUNKS, seed) for seed in range(CHUNKS)]
     parts, number = pool.map(repeated, tasks, chunksize=1), repetitions // CHUNKS * CHUNKS
-    for method in case.methods:
+    for method in METHODS:
         sums = [sum(part) for part in zip(*(part[method] for part in parts), strict=True)]
         first, squares, photo_first, photo_squares = sums
         points, photos = stated(case, method)
@@ -213,14 +203,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repetitions", type=int, default=2000)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--only", nargs="*", help="words of the names of the strips wanted")
     wanted = parser.parse_args()
-    # one worker needs no other process
-    with get_context("spawn").Pool(wanted.workers) if wanted.workers > 1 else ThreadPool(1) as pool:
+    with get_context("spawn").Pool(wanted.workers) as pool:
         print(f"{'strip':24} {'method':13} {'points: along, across, up':19} {'photos: centre, rotation':44} single")
         for case in SCATTER:
-            if not wanted.only or any(word in case.name for word in wanted.only):
-                scatter(pool, case, wanted.repetitions)
+            scatter(pool, case, wanted.repetitions)
 
 
 if __name__ == "__main__":

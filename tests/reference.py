@@ -176,14 +176,9 @@ def _escaped(text: str) -> str:
 
 
 def every_command() -> Iterator[tuple[str, Any]]:
-    """Return every command with its name, each followed by those below it."""
+    """Return every command with its name."""
     root: Any = typer.main.get_command(PROGRAM)
-    waiting = [(name, root.commands[name]) for name in COMMANDS]
-    while waiting:
-        name, command = waiting.pop(0)
-        yield name, command
-        below = getattr(command, "commands", {})
-        waiting = [*((f"{name} {inner}", each) for inner, each in below.items()), *waiting]
+    return ((name, root.commands[name]) for name in COMMANDS)
 
 
 def records(command: Any, kind: str) -> Iterator[tuple[str, str]]:  # noqa: ANN401
@@ -202,15 +197,10 @@ def command_page() -> str:
         lines += [f"## `photostrip {name}`", ""]
         for paragraph in (command.help or "").partition("\f")[0].replace("\b", "").strip().split("\n\n"):
             lines += [_escaped(" ".join(paragraph.split())), ""]
-        below = getattr(command, "commands", {})
-        if below:
-            links = ", ".join(f"[{each}](#{_anchor(f'photostrip {name} {each}')})" for each in below)
-            lines += [f"Commands: {links}.", ""]
         rows = [*records(command, "argument"), *records(command, "option")]
         lines += ["| argument, option | |", "|---|---|"]
         lines += [f"| {_escaped(f'`{term}`')} | {_escaped(text)} |" for term, text in rows]
-        if name in COMMANDS:
-            lines += ["", "```text", *textwrap.dedent(COMMANDS[name][1]).splitlines(), "```"]
+        lines += ["", "```text", *textwrap.dedent(COMMANDS[name][1]).splitlines(), "```"]
         lines.append("")
     for title, entries in (("Exit codes", EXIT_CODES), ("Environment", VARIABLES)):
         lines += [f"## {title}", "", "| | |", "|---|---|"]
@@ -232,10 +222,6 @@ def keys_page() -> str:
 def plain_fences(page: str) -> str:
     """Take away what stands behind the kind of a block for ``tests/pages.py``: sites take such a line for prose."""
     return re.sub(r"(?m)^(```[a-z]+) .*$", r"\1", page)
-
-
-def _anchor(title: str) -> str:
-    return title.replace(" ", "-")
 
 
 def main() -> None:

@@ -28,12 +28,10 @@ def printed(program: str, *options: str, python: str = "") -> str:
 
 @pytest.mark.slow
 def test_accuracy_prints_limits_and_what_was_measured() -> None:
-    out = printed("accuracy.py", "--seeds", "1", "--cases", "b", "long", "--workers", "1", "--longest", "10")
-    rows = re.findall(r"^5 rows +10\.0 +degree 3 +0\.112/0\.230 +(\d\.\d{3})/(\d\.\d{3})", out, re.MULTILINE)
+    out = printed("accuracy.py", "--seeds", "1", "--cases", "b", "--workers", "1")
+    rows = re.findall(r"^degree 3 +1\d\.\d +0\.112/0\.230 +(\d\.\d{3})/(\d\.\d{3})", out, re.MULTILINE)
     assert len(rows) == 1
     assert all(0.05 < float(value) < 0.6 for value in nonempty(rows[0]))
-    assert "auto against the best fixed choice" in out
-    assert re.search(r"^10 photos +\d", out, re.MULTILINE)
 
 
 @pytest.mark.slow
@@ -52,28 +50,13 @@ def test_bundle_prints_times_and_ratios() -> None:
     assert len(re.findall(r"^\d+ x \d+ +- +- +- +\d\.\d\d of 1\.00 +(?:yes|no)$", out, re.MULTILINE)) == 2
 
 
-def test_bundle_prints_growth(capsys: pytest.CaptureFixture[str]) -> None:
-    from benchmarks.bundle import Case, corridor  # limits the threads of the process
-
-    corridor([Case(1, 10, 40), Case(1, 20, 40)], 1)
-    out = capsys.readouterr().out
-    assert re.search(r"^10 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +1\.00$", out, re.MULTILINE)
-    assert re.search(r"^20 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +\d\.\d\d$", out, re.MULTILINE)
-
-
 @pytest.mark.slow
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
-    assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 4
+    assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 3
     assert re.search(
         r"^models +\d\.\d{3}/\d\.\d{3} +\d\.\d{3}/\d\.\d{3} +\d+ of \d+ +\d+ of \d+ +0 of 0", out, re.MULTILINE
     )
-
-
-@pytest.mark.slow
-def test_gross_errors_finds_wrong_control() -> None:
-    out = printed("gross_errors.py", "1", "--kind", "wrong-control", "--workers", "1", "--first-seed", "3")
-    assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
 
 
 @pytest.mark.slow

@@ -136,23 +136,6 @@ def test_typer_exit_is_respected() -> None:
     assert probe(calling=failing(typer.Exit(1))) == 1
 
 
-def test_a_command_may_have_subcommands(capsys: pytest.CaptureFixture[str]) -> None:
-    group = typer.Typer(rich_markup_mode=None, add_completion=False)
-
-    @group.command()
-    def first(number: int) -> None:
-        typer.echo(number + 1)
-
-    @group.command()
-    def second() -> int:
-        return 3
-
-    whole = cli.program([("probe", group, "photostrip probe first 1")])
-    assert cli.main(["probe", "first", "41"], whole) == 0
-    assert capsys.readouterr().out == "42\n"
-    assert cli.main(["probe", "second"], whole) == 3
-
-
 FAULTS = InputError([Fault("no such photo", file="a.csv", line=3, column=7), Fault("empty", key="cameras")])
 
 

@@ -33,12 +33,12 @@ from photostrip.cli.commands.statement import statement
 from photostrip.cli.commands.step import step
 from photostrip.cli.commands.terrestrial import terrestrial
 from photostrip.cli.failures import DEBUG, exit_code_of
-from photostrip.cli.option_groups import HELP_NAMES
 from photostrip.errors import EXIT_INPUT
 
 Command = Callable[..., int | None]
+HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 NEW_OBJECTS = 1_000_000  # between two looks of the garbage collector
-COMMANDS: dict[str, tuple[Command | typer.Typer, str]] = {
+COMMANDS: dict[str, tuple[Command, str]] = {
     "init": (init, "photostrip init strip-a"),
     "convert": (convert, "photostrip convert sparse/0 -o block --sigma 0.7"),
     "check": (check, "photostrip check project.yaml"),
@@ -49,7 +49,7 @@ COMMANDS: dict[str, tuple[Command | typer.Typer, str]] = {
     "compare": (compare, "photostrip compare result baseline.json --tol exact.yaml"),
     "simulate": (simulate, "photostrip simulate strip.yaml -o simulated"),
     "plan": (plan, "photostrip plan model --set end_lap_percent=60 --set control.layout=corners"),
-    "step": (step, "photostrip step relative pair.csv -f 153 --base 920 --unit m"),
+    "step": (step, "photostrip step relative pair.csv --set principal_distance=153 --set base=920 --set unit=m"),
     "terrestrial": (terrestrial, "photostrip terrestrial displacement survey.yaml -o survey.svg"),
     "sources": (sources, "photostrip sources --format md"),
     "schema": (schema, "photostrip schema -o photostrip.schema.json"),
@@ -82,7 +82,7 @@ def photostrip(
     DEBUG.set(debug)
 
 
-def program(commands: Iterable[tuple[str, Command | typer.Typer, str]]) -> typer.Typer:
+def program(commands: Iterable[tuple[str, Command, str]]) -> typer.Typer:
     """Return a program of commands, each with an example."""
     whole = typer.Typer(
         rich_markup_mode=None,
@@ -94,19 +94,8 @@ def program(commands: Iterable[tuple[str, Command | typer.Typer, str]]) -> typer
     whole.callback()(photostrip)
     for name, command, example in commands:
         epilog = f"\b\nExample:\n  {example}"  # \b: typer keeps the line breaks
-        if isinstance(command, typer.Typer):
-            _end_all(command)
-            whole.add_typer(command, name=name, epilog=epilog)
-        else:
-            whole.command(name, context_settings=HELP_NAMES, epilog=epilog)(_ended(command))
+        whole.command(name, context_settings=HELP_NAMES, epilog=epilog)(_ended(command))
     return whole
-
-
-def _end_all(group: typer.Typer) -> None:
-    for each in group.registered_commands:
-        each.callback = each.callback and _ended(each.callback)
-    for below in group.registered_groups:
-        _end_all(below.typer_instance or typer.Typer())
 
 
 def _ended(command: Command) -> Callable[..., None]:

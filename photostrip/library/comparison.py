@@ -69,7 +69,7 @@ def compare(
     if tolerances is None or isinstance(tolerances, Tolerances):
         allowed = tolerances or Tolerances()
     else:
-        from photostrip.project.profiles.tolerances import load_tolerances
+        from photostrip.project.tolerances import load_tolerances
 
         allowed = load_tolerances(Path(tolerances))[0]
     if not isinstance(result, Result | Mapping) and not isinstance(baseline, Result | Mapping):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,12 +15,13 @@ if TYPE_CHECKING:
     from photostrip.sheets.sheet import Sheet
 
 
-@dataclass(frozen=True, repr=False)
 class Plan:
     """What a plan lets expect."""
 
-    sheet: Sheet
-    files: Sequence[str]  # every file that was read
+    def __init__(self, sheet: Sheet, files: Sequence[str] = ()) -> None:
+        self.sheet = sheet
+        self.files = tuple(files)
+        """Every file that was read."""
 
     @property
     def document(self) -> Document:

@@ -19,7 +19,7 @@ from photostrip.notes import counted
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result as Computed
-    from photostrip.project.checks.check import Checked
+    from photostrip.project.check import Checked
     from photostrip.project.loading import Project as Loaded
 
 _WORD = re.compile(r"[\w-]+")
@@ -213,7 +213,7 @@ def loaded_from(path: Path, assignments: Sequence[str], source: Source | None = 
 
 
 def _checked(path: Path, assignments: Sequence[str], source: Source | None) -> Check:
-    from photostrip.project.checks.check import check_project
+    from photostrip.project.check import check_project
 
     with reading_from(source):
         checked = check_project(path, assignments)

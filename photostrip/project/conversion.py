@@ -8,26 +8,29 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from photostrip import camera
 from photostrip.arrays import Floats, Numbers
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.control import ControlTable
-from photostrip.formats.measured.exterior import ROTATIONS
+from photostrip.formats.measured.exterior import QUATERNION, ROTATIONS
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84, GroundFrame
 from photostrip.geodesy.local_frame import mean_radius, radius_in_azimuth
-from photostrip.geometry.rotation import from_angles
+from photostrip.geometry.rotation import about, angle_rates, angles, from_angles, separable_angles
+from photostrip.notes import Note, counted
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints, concatenated
-from photostrip.project.attitudes import attitudes
 from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPhoto, PixelCamera
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
-from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
+from photostrip.project.schema.ground import Control, Ellipsoid, GivenAngles, GivenList, Orientations, Output
+from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.schema.sections import Section
+from photostrip.project.yaml.tree import Node
 from photostrip.strip.image_coordinates import fiducial_marks
 from photostrip.strip.image_coordinates.fiducial_marks import Certificate
 from photostrip.strip.strip_formation import strip
@@ -44,6 +47,8 @@ T = TypeVar("T", bound="DataclassInstance")
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
 _NUMBERED = re.compile(r"([^0-9]*)([0-9]*)")
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
+AHEAD = about(0, np.pi / 2.0)  # of image axes: a camera that looked down looks ahead
+PIXELS = "px"
 
 
 @dataclass(frozen=True)
@@ -428,3 +433,112 @@ def _laid_over(usual: T, given: Section) -> T:
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))
     return replace(cast("Any", usual), **changed)
+
+
+class Attitudes(NamedTuple):
+    angles: Floats  # (n, 3): radians, in a system of ``geometry.rotation.SYSTEMS``
+    system: str
+    sigma_turns: Floats  # (n, 3): standard deviations of small turns about the axes of the photo, radians
+    stated: bool  # whether angles and system are the user's own
+
+
+def attitudes(values: Floats, sigma: Floats, given: GivenAngles, north: Floats | None) -> Attitudes:
+    """Return rotations from image axes (x right, y up, z towards the viewer) to grid east, grid north, normal.
+
+    values: (n, 3) angles in radians; (n, 4) quaternions w, x, y, z; (n, 9) matrices by rows.
+    sigma: (n, 3) standard deviations of the angles, of others of small turns about the image axes, radians.
+    north: azimuth of grid north at each photo, radians, where the rotations count from true north.
+    """
+    stated = given.system not in ROTATIONS
+    if stated:
+        rotations, rates = from_angles(values, given.system), angle_rates(values, given.system)
+        if given.looks == "ahead":
+            rotations, stated = rotations @ AHEAD, False
+        sigma = np.sqrt(np.einsum("nij,nj->ni", (rotations.transpose(0, 2, 1) @ rates) ** 2, sigma**2))
+    else:
+        rotations = _rotations(values, given)
+    if north is None and stated:
+        return Attitudes(angles=values, system=given.system, sigma_turns=sigma, stated=stated)
+    if north is not None:  # an azimuth from grid north is smaller by the convergence
+        rotations = about(2, north) @ rotations
+    if stated:
+        try:
+            return Attitudes(
+                angles=angles(rotations, given.system), system=given.system, sigma_turns=sigma, stated=stated
+            )
+        except GeometryError:
+            pass
+    system, separable = separable_angles(rotations)
+    return Attitudes(angles=separable, system=system, sigma_turns=sigma, stated=False)
+
+
+def _rotations(values: Floats, given: GivenAngles) -> Floats:
+    """Return the nearest rotations to quaternions, or to matrices as they are printed with few digits."""
+    from scipy.spatial.transform import Rotation  # takes 30 ms to load, and angles do without
+
+    if given.system == QUATERNION:
+        found = Rotation.from_quat(values[:, [1, 2, 3, 0]]).as_matrix()
+    else:
+        found = Rotation.from_matrix(values.reshape(-1, 3, 3)).as_matrix()
+    if given.rotates == "ground_to_image":
+        found = found.transpose(0, 2, 1)
+    turned = found if given.y_axis == "up" else found * (1.0, -1.0, -1.0)
+    return np.asarray(turned, float)
+
+
+def with_pixel_sizes(
+    project: ProjectFile, marks: Measurements | None, known: Mapping[str, camera.Camera], root: Node
+) -> tuple[dict[str, camera.Camera], list[Note]]:
+    """Return the cameras with the sizes of pixels that the project does not state and its marks tell.
+
+    The interior orientation of each photo finds its own scale: this one makes millimetres of the stated standard
+    deviations and of whatever is said about measured coordinates.
+
+    Raises InputError for a camera whose marks tell no scale.
+    """
+    found = dict(known)
+    notes: list[Note] = []
+    faults: list[Fault] = []
+    given, observations = project.fiducial_measurements, project.observations
+    if given is None or marks is None or observations is None:
+        return found, notes
+    if observations.unit != PIXELS or (given.unit or PIXELS) != PIXELS:
+        return found, notes
+    for name, owner in known.items():
+        photos = {photo for photo, used in project.camera_of.items() if used == name}
+        if owner.pixel_size is not None or not owner.fiducials or not photos:
+            continue
+        sizes = _sizes(marks, owner, photos)
+        path = ("cameras", name, "pixel_size")
+        if not len(sizes):
+            message = "the fiducial marks do not tell the size of a pixel"
+            faults.append(Fault(message, "missing-key", key=".".join(path), expected="the size of a pixel in mm"))
+            continue
+        size = float(f"{np.median(sizes):.6g}")
+        found[name] = replace(owner, pixel_size=size)
+        message = (
+            f"camera {name} has no pixel_size: a pixel is {size * 1000:.4g} µm by the calibrated fiducial marks of "
+            f"{counted(len(sizes), 'photo')}"
+        )
+        place = root.place_of(path[:2])
+        note = Note("pixel-size-derived", message, "note", file=place.file, line=place.line, column=place.column)
+        notes.append(replace(note, key=".".join(path)))
+    if faults:
+        raise InputError(faults)
+    return found, notes
+
+
+def _sizes(marks: Measurements, owner: camera.Camera, photos: set[str]) -> Floats:
+    """Millimetres to a pixel of each photo with two marks or more, from how far its marks lie about their centroid."""
+    names = {name: row for row, name in enumerate(owner.fiducials)}
+    calibrated = np.array(list(owner.fiducials.values()), float)
+    row_of = np.array([names.get(name, -1) for name in marks.target_ids], np.intp)[marks.target]
+    found = []
+    for number, photo in enumerate(marks.photo_ids):
+        rows = np.flatnonzero((marks.photo == number) & (row_of >= 0))
+        if photo not in photos or len(rows) < 2:
+            continue
+        spreads = [np.linalg.norm(xy - xy.mean(axis=0)) for xy in (calibrated[row_of[rows]], marks.xy[rows])]
+        if min(spreads) > 0.0:
+            found.append(float(spreads[0] / spreads[1]))
+    return np.array(found)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, get_origin
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from photostrip.project.schema.sections import Section, bare, is_section
-from photostrip.project.schema.values import AUTO
+from photostrip.project.schema.sections import AUTO, Section, bare, is_section
 
 if TYPE_CHECKING:
     from pydantic_core import core_schema
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
-    "tolerances": ("profiles.tolerances", "ToleranceFile", "photostrip tolerance profile"),
+    "tolerances": ("tolerances", "ToleranceFile", "photostrip tolerance profile"),
     "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
     "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
     "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),
@@ -34,6 +33,22 @@ KINDS = {  # where the keys of each kind of file stand, and its title
             "orientation": "OrientationFile",
             "one-station": "OneStationFile",
             "cameras": "CamerasFile",
+        }.items()
+    },
+    **{
+        f"step {name}": ("steps", f"{kind}Keys", f"photostrip step {name}")
+        for name, kind in {
+            "interior": "Interior",
+            "refine": "Refine",
+            "relative": "Relative",
+            "intersection": "Intersection",
+            "chain": "Step",
+            "scale": "Step",
+            "strip": "Strip",
+            "absolute": "Absolute",
+            "polynomial": "Polynomial",
+            "resection": "Resection",
+            "bundle": "Bundle",
         }.items()
     },
 }

@@ -25,9 +25,9 @@ from photostrip.pipeline.frames import TiedFrames
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
+from photostrip.project.conversion import with_pixel_sizes
 from photostrip.project.hints import hints
 from photostrip.project.models import check_models, measured_models
-from photostrip.project.pixel_size import with_pixel_sizes
 from photostrip.project.places import ListedPoints, listed_points, of_points, places_of
 from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema.cameras import Camera as CameraBlock
@@ -35,10 +35,9 @@ from photostrip.project.schema.ground import CameraPositions as CameraPositionsB
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.tables import Tables, check_tables, in_one_zone, measured_photos, read_tables
-from photostrip.project.yaml.reading import Reading
+from photostrip.project.yaml.reading import Reading, valid_section
 from photostrip.project.yaml.references import check_references
 from photostrip.project.yaml.tree import NO_FILES, Node, at_own_key
-from photostrip.project.yaml.validation import valid_section
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result

@@ -14,9 +14,8 @@ from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import Ellipsoid
 from photostrip.project.schema.project_file import ProjectFile
-from photostrip.project.schema.sections import Section
-from photostrip.project.schema.values import Text
-from photostrip.project.yaml.merging import path_of
+from photostrip.project.schema.sections import Section, Text
+from photostrip.project.yaml.reading import path_of
 from photostrip.project.yaml.tree import Node
 
 HEADER = (

@@ -18,19 +18,23 @@ from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid
 from photostrip.project.schema.measurements import Unit
-from photostrip.project.schema.sections import After, Before, Section, key, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.schema.sections import (
+    After,
     Axes,
+    Before,
     Flag,
     Height,
     Number,
     Pair,
     Positive,
+    Section,
     Triple,
     Whole,
     Words,
     YAxis,
+    key,
     schema_number,
+    wrong,
 )
 from photostrip.project.yaml.reading import Reading, read_file
 

@@ -144,6 +144,7 @@ class Rows:
     across: str = ""
     tables: Sequence[str] = ()
     most: int = 0  # columns that are shown of many, evenly
+    exact: bool = False  # whether JSON and CSV have all digits
 
     def sections(self) -> Iterator[Section]:
         if self.across:
@@ -182,7 +183,11 @@ class Rows:
 
     def plain(self) -> list[Document]:
         return [
-            {each.key: plain(value, each.form) for each, value in zip(self.fields, row, strict=True) if each.key}
+            {
+                each.key: plain(value, "" if self.exact else each.form)
+                for each, value in zip(self.fields, row, strict=True)
+                if each.key
+            }
             for row in self.rows
         ]
 

@@ -11,7 +11,7 @@ import pytest
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from tests.foreign.colmap_models import OPENCV, name_of, simulated
 from tests.foreign.converting import convert, refused, with_control
 from tests.loops import nonempty

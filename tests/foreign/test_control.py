@@ -10,7 +10,7 @@ import pytest
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from tests.foreign.colmap_models import simulated
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from tests.foreign import historix_blocks, opensfm_models
 from tests.foreign.colmap_models import small_model
 from tests.foreign.converting import convert

@@ -11,7 +11,7 @@ import pytest
 from pyproj import Transformer
 
 import photostrip
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from tests.foreign.colmap_models import name_of, simulated, small_model
 from tests.foreign.converting import convert, refused
 from tests.foreign.opensfm_models import ground_control

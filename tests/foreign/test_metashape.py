@@ -13,7 +13,7 @@ from pyproj import Transformer
 
 import photostrip
 from photostrip.geometry.rotation import from_angles
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from photostrip.result.table import rows_of
 from tests.foreign import colmap_models
 from tests.foreign.colmap_models import F

@@ -9,7 +9,7 @@ import pytest
 from pyproj import Transformer
 
 import photostrip
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from tests.foreign.colmap_models import simulated, small_model
 from tests.foreign.converting import convert, refused, with_control
 from tests.foreign.opensfm_models import BROWN, ground_control, reconstruction, tracks, write

@@ -157,16 +157,6 @@ def test_feet_in_plan_and_metres_in_height() -> None:
     assert grid.difference(a, b)[0] == pytest.approx((US_FOOT, 3.0 * US_FOOT, 2.0))
 
 
-def test_grads_from_paris() -> None:
-    grid = frame("EPSG:4807", axes=NEU)
-    assert grid.plan_unit == "grad"
-    lat, lon, h = grid.user_from_internal(grid.ground_from_cartesian(cartesian(grid, np.array([0.9, 45.0, 80.0]))))[0]
-    assert (lat, lon, h) == pytest.approx((50.0, 1.0, 80.0))
-    radius = 6378249.2**2 / math.hypot(6378249.2, 6356515.0)  # of the parallel of 45 degrees, Clarke 1880 IGN
-    found = grid.difference([[1.0, 50.0, 0.0]], [[0.0, 50.0, 0.0]])[0]
-    assert found == pytest.approx((radius * math.pi / 200.0, 0.0, 0.0))
-
-
 def test_the_moon_by_its_code_and_by_its_radius_is_one() -> None:
     specs = [spec("IAU_2015:30110"), spec("+proj=eqc +R=1737400"), spec("geocentric", ellipsoid=(MOON, MOON))]
     (code, radius, geocentric), _ = tie_frames(specs)

@@ -19,6 +19,7 @@ from photostrip.geometry.rotation import (
     from_alpha_omega_kappa,
     from_angles,
     from_vector,
+    to_vector,
 )
 from tests.attitudes import angle_between
 from tests.vectors import cases
@@ -88,6 +89,7 @@ def test_a_rotation_vector_turns_as_scipy_says(vector: tuple[float, float, float
     short = np.array(vector) / 250  # up to two turns
     theirs = Rotation.from_rotvec(short).as_matrix()
     assert np.allclose(from_vector(short), theirs, rtol=0, atol=1e-13)
+    assert np.allclose(to_vector(theirs), Rotation.from_rotvec(short).as_rotvec(), rtol=0, atol=1e-7)
 
 
 @given(st.integers(0, 10_000), st.integers(0, 10_000))

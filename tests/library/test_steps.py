@@ -134,15 +134,15 @@ def test_a_strip_is_formed_at_once(truth: Truth, tmp_path: Path, capsys: pytest.
     images = tmp_path / "images.csv"
     lines = [f"{photo},{name},{x!r},{y!r}" for (photo, name), (x, y) in zip(seen, xy.tolist(), strict=True)]
     images.write_text("\n".join(["photo,point,x,y", *lines]), encoding="utf-8")
-    assert main(["step", "strip", str(images), "-f", "153", "--base", "92", "--format", "json"]) == 0
+    assert call("strip", str(images), F153, "base=92", "--format", "json") == 0
     out = json.loads(capsys.readouterr().out)
-    assert [row[0] for row in out["points"]] == [name for name, here in zip(ids, placed, strict=True) if here]
-    np.testing.assert_allclose([row[1:4] for row in out["photos"]], found.centers, atol=6e-5)
+    assert [row["point"] for row in out["points"]] == [name for name, here in zip(ids, placed, strict=True) if here]
+    np.testing.assert_allclose([[row[axis] for axis in "xyz"] for row in out["photos"]], found.centers, atol=6e-5)
     assert out["values"][1] == {"name": "k 1-2", "value": pytest.approx(found.factors[1]), "unit": "", "sigma": None}
-    assert main(["step", "strip", str(images), "-f", "153", "--trace"]) == 0
+    assert call("strip", str(images), F153, "--trace") == 0
     assert f"{found.factors[1]:.7f}" in capsys.readouterr().out
     images.write_text("\n".join(["photo,point,x,y", *lines, lines[0]]), encoding="utf-8")
-    assert main(["step", "strip", str(images), "-f", "153"]) == 2
+    assert call("strip", str(images), F153) == 2
     assert "is already measured on photo 0" in capsys.readouterr().err
 
 
@@ -205,7 +205,7 @@ class Flown:
         names = [name for name, here in zip(self.ids, known, strict=True) if here]
         ground = np.vstack([self.given[known], [9.0, 9.0, 9.0]])
         control = table(folder / "control.csv", "point x_ground y_ground z_ground", [*names, "not seen"], ground)
-        return ["bundle", str(folder / "images.csv"), "-f", "153", "--control", control]
+        return ["bundle", str(folder / "images.csv"), F153, f"control={control}"]
 
 
 @pytest.fixture(scope="module")
@@ -231,9 +231,9 @@ def test_the_bundle_starts_from_the_strip(truth: Truth, flown: Flown) -> None:
 
 def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command, found = flown.command(tmp_path), steps.bundle(flown.rays, F, ground=flown.given)
-    assert main(["step", *command, "--format", "json"]) == 0
+    assert call(*command, "--format", "json") == 0
     out = capsys.readouterr().out
-    rows = {row[0]: np.array(row[1:], float) for row in json.loads(out)["points"]}
+    rows = {row["point"]: np.array(list(row.values())[1:], float) for row in json.loads(out)["points"]}
     assert list(rows) == [name for name, here in zip(flown.ids, flown.placed, strict=True) if here]
     expected = np.hstack([found.points, found.sigmas, found.points - flown.given])[flown.placed]
     np.testing.assert_allclose(np.array(list(rows.values())), expected, atol=6e-5)
@@ -242,20 +242,22 @@ def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: pytest.Ca
         "redundancy": found.redundancy,
         "iterations": found.iterations,
     }
-    assert [row[0] for row in json.loads(out)["photos"]] == ["0", "1", "2"]
+    assert [row["photo"] for row in json.loads(out)["photos"]] == ["0", "1", "2"]
     tables, taken = traced(capsys, *command), flown.placed[flown.point]
-    left = np.column_stack([tables["Rays"][axis] - tables["Rays"][f"{axis}'"] for axis in "xy"])
+    left = np.column_stack([tables["rays"][axis] - tables["rays"][f"{axis}'"] for axis in "xy"])
     np.testing.assert_allclose(left, found.residuals[taken], atol=1e-9)
-    squares = tables["Steps of all photos and points"]["[pvv]"]
+    squares = tables["steps_of_all_photos_and_points"]["[pvv]"]
     assert squares[-1] == pytest.approx(found.sigma0**2 * found.redundancy)
-    half = ["--sigma-um", "2.5", "--control-sigma", "0.025", "--format", "json"]
-    assert main(["step", *command, *half]) == 0
+    half = ["sigma_um=2.5", "control_sigma=0.025", "--format", "json"]
+    assert call(*command, *half) == 0
     assert values(capsys.readouterr().out)["sigma0"] == pytest.approx(2 * found.sigma0)
     free = steps.bundle(flown.rays, F, base=92.0)
-    assert main(["step", *command[:4], "--base", "92", "--format", "json"]) == 0
+    assert call(*command[:3], "base=92", "--format", "json") == 0
     out = capsys.readouterr().out
     assert values(out)["redundancy"] == free.redundancy
-    np.testing.assert_allclose([row[1:4] for row in json.loads(out)["photos"]], free.centers, atol=6e-5)
+    np.testing.assert_allclose(
+        [[row[axis] for axis in "xyz"] for row in json.loads(out)["photos"]], free.centers, atol=6e-5
+    )
 
 
 @pytest.mark.parametrize(
@@ -284,7 +286,7 @@ def test_a_bundle_that_cannot_be_is_refused(
 ) -> None:
     command = flown.command(tmp_path)
     (tmp_path / file).write_text("\n".join(lines), encoding="utf-8")
-    assert main(["step", *command]) == code
+    assert call(*command) == code
     assert message in capsys.readouterr().err
 
 
@@ -360,6 +362,14 @@ def table(path: Path, head: str, ids: list[str], *columns: NDArray[np.float64]) 
     return str(path)
 
 
+F153 = "principal_distance=153"
+
+
+def call(*arguments: str) -> int:
+    """Call a step; what has an equals sign in it is a key that is set."""
+    return main(["step", *(f"--set={each}" if "=" in each else each for each in arguments)])
+
+
 def values(out: str) -> dict[str, float]:
     return {each["name"]: each["value"] for each in json.loads(out)["values"]}
 
@@ -368,25 +378,25 @@ def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: py
     ids = truth.common(0, 1)
     images = truth.image(0, ids), truth.image(1, ids)
     pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, *images)
-    assert main(["step", "relative", pair, "-f", "153", "--base", "900", "--unit", "m", "--format", "json"]) == 0
+    assert call("relative", pair, F153, "base=900", "unit=m", "--format", "json") == 0
     out = capsys.readouterr().out
     found, expected = values(out), steps.relative(*images, F, base=900.0)
     assert found["kappa2"] == pytest.approx(np.degrees(expected.elements[4]), abs=1e-6)
     assert found["by"] == pytest.approx(900 * expected.base[1])
     turned = from_angles(np.radians([found[name] for name in ("omega", "phi", "kappa")]), "omega-phi-kappa")
     np.testing.assert_allclose(turned, expected.rotation, atol=1e-9)
-    np.testing.assert_allclose([row[2:] for row in json.loads(out)["points"]], expected.model, atol=6e-5)
+    np.testing.assert_allclose([list(row.values())[2:] for row in json.loads(out)["points"]], expected.model, atol=6e-5)
 
     model = table(
         tmp_path / "control.csv", "point x y z x_ground y_ground z_ground", ids, expected.model, truth.xyz(ids)
     )
-    assert main(["step", "absolute", model, "--format", "json"]) == 0
+    assert call("absolute", model, "--format", "json") == 0
     assert values(capsys.readouterr().out)["scale"] == pytest.approx(
         steps.absolute(expected.model, truth.xyz(ids)).similarity.scale
     )
 
     photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, images[0], truth.xyz(ids))
-    assert main(["step", "resection", photo, "-f", "153", "--format", "json"]) == 0
+    assert call("resection", photo, F153, "--format", "json") == 0
     oriented = values(capsys.readouterr().out)
     assert [oriented[axis] for axis in "xyz"] == pytest.approx(truth.centers[0].tolist(), abs=1e-4)
 
@@ -397,55 +407,51 @@ def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: py
         np.eye(4)[:, :2] * 100,
         np.eye(4)[:, :2] * 100 + 1,
     )
-    assert main(["step", "interior", marks, "--transform", "conformal", "--format", "json"]) == 0
+    assert call("interior", marks, "transform=conformal", "--format", "json") == 0
     assert values(capsys.readouterr().out)["x: 1"] == pytest.approx(1.0)
 
     points = table(tmp_path / "points.csv", "point x y", ids, images[0])
-    assert main(["step", "refine", points, "-f", "153", "--principal-point", "0.5,-0.25", "--format", "csv"]) == 0
+    assert call("refine", points, F153, "principal_point=[0.5, -0.25]", "--format", "csv") == 0
     rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
     assert [float(row["dx"]) for row in rows] == [-500.0] * len(ids)
 
     strip = table(
         tmp_path / "strip.csv", "photo omega phi kappa", ["1", "2"], np.array([[1.0, 2.0, 30.0], [3.0, 2.0, 1.0]])
     )
-    assert main(["step", "chain", strip, "--format", "json"]) == 0
-    handed = np.radians([row[1:] for row in json.loads(capsys.readouterr().out)["points"]])
+    assert call("chain", strip, "--format", "json") == 0
+    handed = np.radians([list(row.values())[1:] for row in json.loads(capsys.readouterr().out)["points"]])
     turns = [from_angles(np.radians(each), "omega-phi-kappa") for each in ([1.0, 2.0, 30.0], [3.0, 2.0, 1.0])]
     np.testing.assert_allclose(from_angles(handed[1], "omega-phi-kappa"), turns[0] @ turns[1], atol=2e-8)
 
     junction = table(
         tmp_path / "junction.csv", "point x y z x_next y_next z_next", ids, expected.model, expected.model / 1.25
     )
-    assert main(["step", "scale", junction, "--format", "json"]) == 0
+    assert call("scale", junction, "--format", "json") == 0
     assert values(capsys.readouterr().out) == {"k": pytest.approx(1.25), "rms departure": pytest.approx(0, abs=1e-6)}
 
     bend = (2 + 3e-3 * expected.model[:, 0])[:, None]
     control = table(tmp_path / "bend.csv", "point x y z misclosure", ids, expected.model, bend)
-    assert main(["step", "polynomial", control, "--terms", "1,X", "--format", "json"]) == 0
+    assert call("polynomial", control, "terms=[1, X]", "--format", "json") == 0
     fitted = values(capsys.readouterr().out)
     assert [fitted["1"], fitted["X"]] == pytest.approx([2, 3e-3])
 
     base = ",".join(str(each) for each in truth.rotations[0].T @ (truth.centers[1] - truth.centers[0]))
     angles = ",".join(str(found[name]) for name in ("omega", "phi", "kappa"))
-    assert (
-        main(["step", "intersection", pair, "-f", "153", f"--base={base}", f"--right={angles}", "--format", "json"])
-        == 0
-    )
-    places = np.array([row[1:4] for row in json.loads(capsys.readouterr().out)["points"]])
+    given = (f"base=[{base}]", f"right=[{angles}]")
+    assert call("intersection", pair, F153, *given, "--format", "json") == 0
+    places = np.array([list(row.values())[1:4] for row in json.loads(capsys.readouterr().out)["points"]])
     np.testing.assert_allclose(places @ truth.rotations[0].T + truth.centers[0], truth.xyz(ids), atol=2e-4)
 
 
 def traced(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, dict[str, NDArray[np.float64]]]:
     """Give the tables of the trace of a step: columns by name."""
-    assert main(["step", *arguments, "--trace", "--format", "json"]) == 0
-    tables = json.loads(capsys.readouterr().out)["trace"]
-    assert all(each["equations"] for each in nonempty(tables) if each["title"] == "Points")
+    assert call(*arguments, "--trace", "--format", "json") == 0
+    tables = {key: each for key, each in json.loads(capsys.readouterr().out).items() if key.startswith("trace_")}
     return {
-        each["title"]: {
-            column["name"]: np.array([row[k] for row in each["rows"]], float)
-            for k, column in enumerate(each["columns"], 1)
+        key.removeprefix("trace_"): {
+            name: np.array([row[name] for row in rows], float) for name in rows[0] if name != "id"
         }
-        for each in tables
+        for key, rows in nonempty(tables.items())
     }
 
 
@@ -455,42 +461,42 @@ def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, caps
     left, right = (truth.image(photo, ids) + rng.normal(0, 0.005, (len(ids), 2)) for photo in (0, 1))
     pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, left, right)
     found = steps.relative(left, right, F, base=920.0)
-    tables = traced(capsys, "relative", pair, "-f", "153", "--base", "920")
-    before, added = tables["Elements before each step"], tables["What the step adds"]
+    tables = traced(capsys, "relative", pair, F153, "base=920")
+    before, added = tables["elements_before_each_step"], tables["what_the_step_adds"]
     for k, name in enumerate(("alpha1", "kappa1", "alpha2", "omega2", "kappa2")):
         assert before[name][-1] + added[name][-1] == pytest.approx(np.degrees(found.elements[k]), abs=1e-9)
         np.testing.assert_allclose(before[name][:-1] + added[name][:-1], before[name][1:], atol=1e-9)
     assert before["[qq]"][-1] == pytest.approx((found.parallax**2).sum())
-    (points,) = [each for title, each in tables.items() if title.startswith("Points")]
+    (points,) = [each for title, each in tables.items() if title.startswith("points")]
     np.testing.assert_allclose(points["y1h"] - points["y2h"], found.parallax, atol=1e-9)
     np.testing.assert_allclose(points["N"] * points["x1h"], found.model[:, 0])
     np.testing.assert_allclose((points["Y1"] + points["Y2"]) / 2, found.model[:, 1])
 
-    tables = traced(capsys, "intersection", pair, "-f", "153", "--base=900,10,-20", "--right=0.2,-0.1,1.4")
+    tables = traced(capsys, "intersection", pair, F153, "base=[900, 10, -20]", "right=[0.2, -0.1, 1.4]")
     turned = from_angles(np.radians([0.2, -0.1, 1.4]), "omega-phi-kappa")
     met = steps.intersection(left, right, F, base=[900, 10, -20], rotations=(np.eye(3), turned))
-    np.testing.assert_allclose(tables["Points"]["Y1"] - tables["Points"]["Y2"], met.gap, atol=1e-9)
+    np.testing.assert_allclose(tables["points"]["Y1"] - tables["points"]["Y2"], met.gap, atol=1e-9)
 
     across = table(tmp_path / "across.csv", "point x_left y_left x_right y_right", ids, left[:, ::-1], right[:, ::-1])
-    tables = traced(capsys, "intersection", across, "-f", "153", "--base=10,900,-20")
+    tables = traced(capsys, "intersection", across, F153, "base=[10, 900, -20]")
     met = steps.intersection(
         left[:, ::-1], right[:, ::-1], F, base=[10, 900, -20], rotations=(np.eye(3), np.eye(3)), left_ray=True
     )
-    np.testing.assert_allclose(tables["Points"]["X1"] - tables["Points"]["X2"], met.gap, atol=1e-9)
-    np.testing.assert_allclose(tables["Points"]["N"] * tables["Points"]["y1h"], met.xyz[:, 1])
+    np.testing.assert_allclose(tables["points"]["X1"] - tables["points"]["X2"], met.gap, atol=1e-9)
+    np.testing.assert_allclose(tables["points"]["N"] * tables["points"]["y1h"], met.xyz[:, 1])
 
     photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, left, truth.xyz(ids))
-    tables = traced(capsys, "resection", photo, "-f", "153")
+    tables = traced(capsys, "resection", photo, F153)
     oriented = steps.resection(left, truth.xyz(ids), F)
-    before, added = tables["Centre before each step"], tables["What the step adds"]
+    before, added = tables["centre_before_each_step"], tables["what_the_step_adds"]
     assert before["X0"][-1] + added["dX0"][-1] == pytest.approx(oriented.center[0], abs=1e-7)
     assert before["[vv]"][-1] == pytest.approx((oriented.residuals**2).sum())
-    np.testing.assert_allclose(tables["Points"]["x"] - tables["Points"]["x'"], oriented.residuals[:, 0], atol=1e-9)
+    np.testing.assert_allclose(tables["points"]["x"] - tables["points"]["x'"], oriented.residuals[:, 0], atol=1e-9)
 
     control = table(
         tmp_path / "control.csv", "point x y z x_ground y_ground z_ground", ids, found.model, truth.xyz(ids)
     )
-    rows = traced(capsys, "absolute", control)["Points"]
+    rows = traced(capsys, "absolute", control)["points"]
     fitted = steps.absolute(found.model, truth.xyz(ids))
     np.testing.assert_allclose(rows["X'"] - rows["X-Xm"], fitted.residuals[:, 0], atol=1e-9)
 
@@ -503,18 +509,18 @@ def test_traces_of_the_other_steps(tmp_path: Path, capsys: pytest.CaptureFixture
         np.array([[0.0, 0.0], [10.0, 0.1], [10.0, 10.0], [0.0, 10.0]]),
         np.array([[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]]),
     )
-    assert main(["step", "interior", marks, "--trace"]) == 0
+    assert call("interior", marks, "--trace") == 0
     out = capsys.readouterr().out
     (line,) = re.findall(r"x' = (.*)\n", out)
     x = eval(line.replace(" x", " * 10").replace(" y", " * 0.1"))  # noqa: S307 (an equation with its numbers)
-    rows = traced(capsys, "interior", marks)["Marks"]
+    rows = traced(capsys, "interior", marks)["marks"]
     assert x == pytest.approx(rows["x'"][1], abs=1e-8)
-    assert main(["step", "interior", marks, "--trace", "--transform", "projective"]) == 0
+    assert call("interior", marks, "--trace", "transform=projective") == 0
     assert re.search(r"x' = \(.*\) / \(", capsys.readouterr().out)
 
     points = table(tmp_path / "points.csv", "point x y", ["1", "2"], np.array([[80.0, 60.0], [-100.0, 20.0]]))
-    lens = ["-f", "153", "--principal-point", "0.2,-0.1", "--k", "2e-8,0,0", "--flying-height", "3000"]
-    rows = traced(capsys, "refine", points, *lens)["Corrections, one after the other"]
+    lens = [F153, "principal_point=[0.2, -0.1]", "k=[2e-8, 0, 0]", "flying_height=3000"]
+    rows = traced(capsys, "refine", points, *lens)["corrections"]
     np.testing.assert_allclose(rows["lens_x"], 2e-8 * rows["r"] ** 2 * rows["x-x0"] * 1000, atol=1e-9)
     np.testing.assert_allclose(rows["x-x0"] + (rows["lens_x"] + rows["refr_x"]) / 1000, rows["x'"])
     assert (rows["refr_x"] * rows["x-x0"] < 0).all()
@@ -527,10 +533,10 @@ def test_traces_of_the_other_steps(tmp_path: Path, capsys: pytest.CaptureFixture
     junction = table(
         tmp_path / "junction.csv", "point x y z x_next y_next z_next", ["1", "2"], np.eye(3)[:2] * 3, np.eye(3)[:2] * 2
     )
-    assert traced(capsys, "scale", junction)["Points"]["k_t"].tolist() == [1.5, 1.5]
+    assert traced(capsys, "scale", junction)["points"]["k_t"].tolist() == [1.5, 1.5]
     line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
     control = table(tmp_path / "c.csv", "point x y z misclosure", ["1", "2", "3"], line, np.array([[1.0], [3], [6]]))
-    rows = traced(capsys, "polynomial", control, "--terms", "1,X")["Points"]
+    rows = traced(capsys, "polynomial", control, "terms=[1, X]")["points"]
     np.testing.assert_allclose(rows["polynomial"] + rows["v"], [1, 3, 6])
     np.testing.assert_allclose(rows["X"], [0, 1, 2])
 
@@ -544,24 +550,24 @@ def test_traces_of_the_other_steps(tmp_path: Path, capsys: pytest.CaptureFixture
         (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], [], 3, "1 common points cannot orient a pair"),
         ([], [], 2, "pair.csv: is empty"),
         (["\0"], [], 2, "it has NUL bytes"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], ["-o", "model.xls"], 2, "no step is written as '.xls'"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], ["--base", "0"], 2, "0"),
+        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], ["-o", "model.xls"], 2, "nothing is written as '.xls'"),
+        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], ["base=0"], 2, "base: 0 is out of range"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], lines: list[str], options: list[str], code: int, message: str
 ) -> None:
     (tmp_path / "pair.csv").write_text("\n".join(lines), encoding="utf-8")
-    assert main(["step", "relative", str(tmp_path / "pair.csv"), "-f", "153", *options]) == code
+    assert call("relative", str(tmp_path / "pair.csv"), F153, *options) == code
     assert message in capsys.readouterr().err
 
 
 def test_a_missing_table_and_wrong_numbers_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["step", "interior", str(tmp_path / "none.csv")]) == 2
+    assert call("interior", str(tmp_path / "none.csv")) == 2
     assert "does not exist" in capsys.readouterr().err
     (tmp_path / "points.csv").write_text("point,x,y\n1,2,3\n", encoding="utf-8")
-    assert main(["step", "refine", str(tmp_path / "points.csv"), "-f", "153", "--k", "1,nan,0"]) == 2
-    assert "'1,nan,0' is not 3 numbers with commas between them" in capsys.readouterr().err
+    assert call("refine", str(tmp_path / "points.csv"), F153, "k=[1, nan, 0]") == 2
+    assert "--set: k[1]: `nan` is not a measured value" in capsys.readouterr().err
 
 
 def test_the_coefficients_of_an_interior_orientation_can_be_used_as_printed(
@@ -570,7 +576,7 @@ def test_the_coefficients_of_an_interior_orientation_can_be_used_as_printed(
     measured = np.array([[100.012, -99.982], [-111.97, -100.01], [-112.0, 112.03], [100.03, 112.05]])
     calibrated = np.array([[106.0, -106.0], [-106.0, -106.0], [-106.0, 106.0], [106.0, 106.0]])
     marks = table(tmp_path / "marks.csv", "mark x y x_photo y_photo", ["1", "2", "3", "4"], measured, calibrated)
-    assert main(["step", "interior", marks]) == 0
+    assert call("interior", marks) == 0
     lines = [line.rsplit(None, 1) for line in capsys.readouterr().out.splitlines() if line[:3] in {"x: ", "y: "}]
     printed = {name: float(value) for name, value in lines}
     terms = {"x": measured[:, 0], "y": measured[:, 1], "1": np.ones(4)}

@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.pipeline.run import triangulate
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from photostrip.project.loading import load_project
 from tests.loops import nonempty
 from tests.project.samples import Sample, sample

@@ -14,7 +14,7 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from photostrip.simulation import Flight, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty

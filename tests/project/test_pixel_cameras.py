@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import photostrip
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 
 if TYPE_CHECKING:
     from pathlib import Path

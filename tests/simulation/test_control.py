@@ -9,7 +9,6 @@ import pytest
 from pyproj import CRS, Transformer
 from scipy import stats
 
-from photostrip.errors import InputError
 from photostrip.points import locate
 from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec, simulate
 from photostrip.simulation.placement import band_photos
@@ -74,23 +73,6 @@ def test_random_control_and_check_points_are_as_many_as_asked_for() -> None:
     assert set(control.ids) <= set(done.observations.point_ids)
     other = simulate(Spec(seed=2, flight=Flight(strips=2), control=Control(layout="random", count=9, check=12)))
     assert not np.allclose(other.control.enu, control.enu)
-
-
-@pytest.mark.parametrize(
-    ("control", "message"),
-    [
-        (Control(check=1000), "1000 check points are asked for, but only 57 points are left"),
-        (Control(layout="random", count=1000), "1000 control points are asked for, but a strip has only 66 points"),
-    ],
-)
-def test_too_many_points_are_refused(control: Control, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        simulate(Spec(control=control))
-
-
-def test_without_noise_the_given_coordinates_are_true() -> None:
-    done = simulate(Spec(control=Control(noise=NONE)))
-    assert done.control.enu == pytest.approx(true_ground(done, done.control.ids), abs=1e-6)
 
 
 @pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:4979", "geocentric", "local"])

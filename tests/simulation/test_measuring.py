@@ -79,10 +79,3 @@ def test_camera_positions(crs: str) -> None:
     error = done.gnss - done.truth.centers_ground
     assert error.std(axis=0) == pytest.approx([0.1, 0.2, 0.4], rel=4 / np.sqrt(2 * 200))
     assert simulate(LARGE).gnss is None
-
-
-def test_one_part_of_a_specification_does_not_change_another() -> None:
-    plain, other = simulate(Spec()), simulate(Spec(film=Film(), gnss=Gnss(), image=Image(sigma_um=20.0)))
-    assert np.array_equal(plain.truth.points.xyz, other.truth.points.xyz)
-    assert np.array_equal(plain.truth.rotations, other.truth.rotations)
-    assert np.array_equal(plain.control.enu, other.control.enu)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Points, Simulation, Spec, Terrain, simulate
+from photostrip.simulation import DIGITAL, FILM, Flight, Ground, Simulation, Spec, Terrain, simulate
 
 
 def photos_of(done: Simulation) -> list[set[int]]:
@@ -47,27 +47,6 @@ def test_every_pair_and_triple_has_its_points(
     assert min(len(a & b) for a, b in itertools.pairwise(on)) >= 9
     assert min(len(a & b & c) for a, b, c in zip(on, on[1:], on[2:], strict=False)) >= 3
     assert min(Counter(done.observations.point.tolist()).values()) >= 2
-
-
-def test_gruber_points_stand_where_they_should() -> None:
-    spec = Spec(
-        ground=Ground(crs="local"),
-        flight=Flight(attitude_sigma_deg=(0.0, 0.0, 0.0), position_sigma=(0.0, 0.0, 0.0)),
-        terrain=Terrain(relief=0.0),
-        points=Points(extra_per_model=0, scatter_percent=0.0),
-        control=Control(layout="corners", check=0),
-    )
-    done = simulate(spec)
-    assert len(done.observations.point_ids) == 30
-    own = [
-        done.truth.image[row].tolist()
-        for row, (photo, point) in enumerate(zip(done.observations.photo, done.observations.point, strict=True))
-        if done.observations.point_ids[point].startswith(f"{done.observations.photo_ids[photo]}-")
-    ]
-    assert len(own) == 26  # four are control points and have other names
-    expected = {(0.0, 92.0), (0.0, 0.0), (0.0, -92.0)}  # 80 % of 115 mm
-    assert {(round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in own} == expected
-    assert Counter(Counter(done.observations.point.tolist()).values()) == {3: 24, 2: 6}
 
 
 def test_overlaps_are_those_asked_for() -> None:

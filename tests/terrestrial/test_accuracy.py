@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.accuracy import EXAMPLES, as_printed, grid, required, worked
+from photostrip.terrestrial.accuracy import EXAMPLES, as_printed, required, worked
 from photostrip.terrestrial.normal_case import directions_from_photo, ground_from_photo
 from tests.loops import nonempty
 from tests.vectors import cases
@@ -64,19 +64,3 @@ def test_required_accuracy_is_that_of_simulated_measurements() -> None:
     spread = found.std(axis=0)
     assert spread[0] == pytest.approx(errors.angle, rel=0.04)
     assert spread[1] == pytest.approx(errors.vertical, rel=0.04)
-
-
-# ---------------------------------------------------------------------------------------------------- theodolite
-
-
-@pytest.mark.parametrize(
-    ("level", "x", "z"),
-    [
-        (True, [0, 30, 60, 80], [0, 30, 60]),
-        (False, [-80, -60, -30, 0, 30, 60, 80], [-60, -30, 0, 30, 60]),
-    ],
-)
-def test_the_grid_ends_at_the_edges(level: bool, x: list[float], z: list[float]) -> None:
-    found = grid((160.0, 120.0), 30.0, level=level)
-    assert found[0].tolist() == x
-    assert found[1].tolist() == z

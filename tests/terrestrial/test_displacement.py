@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.normal_case import displacements, ellipses, intersect, limit
+from photostrip.terrestrial.normal_case import displacements, ellipses, intersect
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -104,12 +104,6 @@ def test_standard_errors_are_the_scatter_of_simulated_pseudo_parallaxes() -> Non
 def covariance(seed: int) -> Floats:
     root = Draws(seed, Purpose.POINTS).normal(3, 3)
     return np.asarray(root @ root.T)
-
-
-def test_limits_are_the_printed_quantiles_of_chi_square() -> None:
-    assert limit(0.05) == pytest.approx(7.815, abs=5e-4)
-    assert limit(0.01) == pytest.approx(11.345, abs=5e-4)
-    assert limit(0.05, 2) == pytest.approx(5.991, abs=5e-4)
 
 
 @given(st.integers(0, 1000))

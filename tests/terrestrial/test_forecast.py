@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,14 +40,6 @@ def test_standard_deviations_are_those_of_the_normal_case() -> None:
         assert each.sigma[0] == pytest.approx(y / F * M * np.hypot(1 - image / p, image / p), rel=1e-9)
 
 
-def test_the_outermost_points_are_on_the_edge_of_a_photo() -> None:
-    found = by_place(SPEC)
-    assert F * found["side"].at[0] / 50 == pytest.approx(80.0)  # the left photo ends first
-    assert F * found["top"].at[2] / 50 == pytest.approx(60.0)
-    turned = by_place(replace(SPEC, convergence=np.radians(12.0)))
-    assert turned["side"].at[0] != pytest.approx(found["side"].at[0], abs=1.0)
-
-
 def drawn(each: PlannedDisplacement, moved: Floats, count: int) -> Floats:
     """Displacements of a point that has moved, from drawn errors, intersected apart from the program."""
     rng = np.random.default_rng(11)
@@ -75,17 +66,3 @@ def test_drawn_displacements_scatter_so_and_are_found_so_often(place: str) -> No
         seen = np.einsum("ni,ij,nj->n", moved, weight, moved) > limit
         assert seen.mean() == pytest.approx(0.8, abs=0.02)
     assert each.worst >= each.found.max() * (1 - 1e-9)
-
-
-def test_one_station_sees_what_moves_across_the_ray() -> None:
-    found = plan_displacements(replace(SPEC, base=None))
-    for each in nonempty(found):
-        assert each.sigma[[0, 2]] == pytest.approx(each.at[1] / F * M * np.ones(2))
-        assert np.isnan(each.sigma[1])
-    # two components: a displacement of 3.10 standard deviations is found in 80 % of cases
-    assert found[0].found[0] / found[0].sigma[0] == pytest.approx(3.104, abs=0.001)
-
-
-def test_a_base_too_long_for_the_distance_shows_nothing() -> None:
-    found = by_place(replace(SPEC, base=200.0))
-    assert all(np.isnan(each.sigma).all() and np.isnan(each.worst) for each in nonempty(found.values()))

@@ -28,7 +28,7 @@ def check(
     """
     from photostrip.cli.jobs.check import print_checked
     from photostrip.errors import EXIT_DONE, EXIT_INPUT
-    from photostrip.project.checks.check import check_project
+    from photostrip.project.check import check_project
     from photostrip.report.page.progress import progress
 
     found = []

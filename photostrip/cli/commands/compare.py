@@ -57,7 +57,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE
     from photostrip.library.again import compare_again
     from photostrip.library.comparison import compare as compared
-    from photostrip.project.profiles.tolerances import load_tolerances
+    from photostrip.project.tolerances import load_tolerances
     from photostrip.report.commands.comparisons import TRUTH
     from photostrip.visible import visible
 

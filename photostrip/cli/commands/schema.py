@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from photostrip.planning import PlanKind
+from photostrip.strip import StepName
 from photostrip.terrestrial import TerrestrialKind
 
 
@@ -22,6 +23,9 @@ def schema(
     terrestrial: Annotated[
         TerrestrialKind | None,
         typer.Option("--terrestrial", help="The file of this computation of `photostrip terrestrial` instead."),
+    ] = None,
+    step: Annotated[
+        StepName | None, typer.Option("--step", help="The keys of this step of `photostrip step` instead.")
     ] = None,
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
@@ -51,11 +55,9 @@ def schema(
             return
         found = result_schema()
     else:
-        flags = {"tolerances": tolerances, "simulation": simulation}
-        kind = next(
-            (name for name, wanted in flags.items() if wanted),
-            plan or (f"terrestrial {terrestrial}" if terrestrial else "project"),
-        )
+        wanted: dict[str, object] = {"tolerances": tolerances, "simulation": simulation, plan or "": plan}
+        wanted |= {f"terrestrial {terrestrial}": terrestrial, f"step {step}": step}
+        kind = next((name for name, asked in wanted.items() if asked), "project")
         found = schema_of(kind)
     text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
     if output is None:

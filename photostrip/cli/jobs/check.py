@@ -9,7 +9,7 @@ from typing import Any
 
 from photostrip import __version__
 from photostrip.cli.stdout import Format, ascii_only, print_sections
-from photostrip.project.checks.check import Checked
+from photostrip.project.check import Checked
 from photostrip.report.commands.check import check_sections, verdict
 from photostrip.report.page import messages
 from photostrip.report.page.text import to_markdown

@@ -14,8 +14,21 @@ from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import Percent, SigmaUm
 from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
-from photostrip.project.schema.values import FirstSchema, Id, Number, Positive, Range, Words, bounded
+from photostrip.project.schema.sections import (
+    After,
+    FirstSchema,
+    Id,
+    Number,
+    Positive,
+    Range,
+    Section,
+    Words,
+    bounded,
+    key,
+    length,
+    rule,
+    wrong,
+)
 from photostrip.project.yaml.reading import read_keys
 from photostrip.units import MICROMETRES
 

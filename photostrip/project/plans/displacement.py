@@ -9,8 +9,21 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from photostrip.project.plans.flown import SigmaUm
-from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
-from photostrip.project.schema.values import FirstSchema, Fraction, Number, Range, Words, bounded, one_of
+from photostrip.project.schema.sections import (
+    After,
+    FirstSchema,
+    Fraction,
+    Number,
+    Range,
+    Section,
+    Words,
+    bounded,
+    key,
+    length,
+    one_of,
+    rule,
+    wrong,
+)
 from photostrip.project.terrestrial.cameras import Camera, CameraOrName, only_camera
 from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
 from photostrip.project.yaml.reading import read_keys

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from photostrip.camera import Camera
 from photostrip.planning.ideal_strip import StripGeometry
-from photostrip.project.schema.sections import After, Section, key, rule, wrong
-from photostrip.project.schema.values import Positive, Range, Triple, Words, bounded
+from photostrip.project.schema.sections import After, Positive, Range, Section, Triple, Words, bounded, key, rule, wrong
 from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
 

@@ -8,19 +8,24 @@ from typing import Annotated, NamedTuple
 
 from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import Flown, Sigmas
-from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.schema.sections import (
+    After,
+    Before,
     FirstSchema,
     Id,
     Number,
     Pair,
     Positive,
     Range,
+    Section,
     Triple,
     Whole,
     Words,
     bounded,
+    key,
     one_of,
+    rule,
+    wrong,
 )
 from photostrip.project.simulation import camera_of
 from photostrip.project.yaml.reading import read_keys

@@ -8,18 +8,23 @@ from typing import Annotated, NamedTuple
 
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.project.plans.flown import SigmaUm
-from photostrip.project.schema.sections import After, Section, key, length, rule, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.schema.sections import (
+    After,
     FirstSchema,
     Fraction,
     NotNegative,
     Number,
     Positive,
     Range,
+    Section,
     Whole,
     Words,
     bounded,
     choice,
+    key,
+    length,
+    rule,
+    wrong,
 )
 from photostrip.project.yaml.reading import read_keys
 from photostrip.strip.relative_orientation.orientation import SCREENINGS

@@ -20,11 +20,26 @@ from photostrip.planning.ideal_strip import (
 )
 from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
 from photostrip.project.plans.flown import Flown, Sigmas
-from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
-from photostrip.project.schema.values import FirstSchema, Flag, Id, Positive, Range, Whole, Words, bounded, one_of
+from photostrip.project.schema.sections import (
+    After,
+    Before,
+    FirstSchema,
+    Flag,
+    Id,
+    Positive,
+    Range,
+    Section,
+    Whole,
+    Words,
+    bounded,
+    key,
+    length,
+    one_of,
+    rule,
+    wrong,
+)
 from photostrip.project.simulation import camera_of
-from photostrip.project.yaml.reading import Reading, read_keys
-from photostrip.project.yaml.validation import valid_section
+from photostrip.project.yaml.reading import Reading, read_keys, valid_section
 from photostrip.simulation import Points
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")

@@ -8,19 +8,25 @@ from photostrip import camera
 from photostrip.errors import InputError
 from photostrip.network.settings import ASKED
 from photostrip.project.schema.ground import Angles
-from photostrip.project.schema.sections import Before, Read, Section, key, length, rule, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.schema.sections import (
+    Before,
     Id,
     Number,
     Pair,
     Positive,
+    Read,
+    Section,
     Triple,
     choice,
     if_empty,
+    key,
     known_word,
+    length,
     quoted,
     read_positive,
+    rule,
     single,
+    wrong,
 )
 from photostrip.strip.image_coordinates import pixel_cameras
 from photostrip.strip.image_coordinates.fiducial_marks import PLACES

@@ -6,8 +6,22 @@ from photostrip.formats.measured.exterior import POSITIONS, ROTATIONS, orientati
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.schema.measurements import COLUMNS, Columns, ControlColumns, TableFile, header_names
-from photostrip.project.schema.sections import Section, key, rule, wrong
-from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, YAxis, choice
+from photostrip.project.schema.sections import (
+    Axes,
+    Flag,
+    Height,
+    Number,
+    Positive,
+    Section,
+    Sigma3,
+    Triple,
+    Words,
+    YAxis,
+    choice,
+    key,
+    rule,
+    wrong,
+)
 
 PositionColumns = Annotated[Columns, header_names(POSITIONS)]
 OrientationColumns = Annotated[

@@ -13,8 +13,23 @@ from photostrip.formats.text.numbers import shown
 from photostrip.formats.text.table_reader import WORDS
 from photostrip.formats.text.table_text import MOST_LINES
 from photostrip.formats.text.tables import Column
-from photostrip.project.schema.sections import After, Before, Read, Section, key, rule, wrong
-from photostrip.project.schema.values import Positive, Sigma3, Words, YAxis, choice, if_empty, text, whole
+from photostrip.project.schema.sections import (
+    After,
+    Before,
+    Positive,
+    Read,
+    Section,
+    Sigma3,
+    Words,
+    YAxis,
+    choice,
+    if_empty,
+    key,
+    rule,
+    text,
+    whole,
+    wrong,
+)
 
 
 def header_names(*layouts: Iterable[Column]) -> After:

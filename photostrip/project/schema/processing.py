@@ -10,8 +10,9 @@ from photostrip.formats.text.numbers import shown
 from photostrip.network.settings import ASKED, SCREENINGS, TESTS
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
 from photostrip.project.schema.cameras import AUTO, SelfCalibration
-from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.schema.sections import (
+    After,
+    Before,
     Flag,
     Fraction,
     Id,
@@ -21,10 +22,14 @@ from photostrip.project.schema.values import (
     Positive,
     PositiveOrAuto,
     Range,
+    Section,
     bounded,
     choice,
     if_empty,
+    key,
     quoted,
+    rule,
+    wrong,
 )
 from photostrip.strip.independent_models.linking import METHODS as LINK_METHODS
 from photostrip.strip.polynomial import DEGREES

@@ -10,8 +10,22 @@ from photostrip.project.schema.exports import ENDINGS, GEOPACKAGE, export, form_
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
-from photostrip.project.schema.sections import Before, OneOrMany, Read, Section, key, length, rule, wrong
-from photostrip.project.schema.values import Positive, Words, if_empty, schema_number, single, text
+from photostrip.project.schema.sections import (
+    Before,
+    OneOrMany,
+    Positive,
+    Read,
+    Section,
+    Words,
+    if_empty,
+    key,
+    length,
+    rule,
+    schema_number,
+    single,
+    text,
+    wrong,
+)
 
 SCHEMA_NUMBER = 1
 _read_schema_number = schema_number("photostrip", SCHEMA_NUMBER)

@@ -9,14 +9,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, model_validator
 from pydantic_core import core_schema
 
+from photostrip.formats.text.findings import suggestion
+from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, shown
+from photostrip.formats.text.numbers import number as read_number
+from photostrip.formats.text.tables import CONTROL_CHARACTER
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+
 T = TypeVar("T", bound="Section")
 Before = BeforeValidator
 After = AfterValidator
+FALSE, TRUE = ("false", "no", "off"), ("true", "yes", "on")
+REPLACED = {"covariance": "bundle"}  # words that were taken once
+_ANY = {"type": ["string", "number", "boolean", "null"]}  # whatever an id looks like, it is read as text
+_NUMBER = {"type": "number"}
+_POSITIVE = {"type": "number", "exclusiveMinimum": 0}
+_FRACTION = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
+AUTO = {"const": "auto"}
+_AXES = {"type": "array", "items": {"enum": [*GROUND_AXES, *CARTESIAN_AXES]}, "minItems": 3, "maxItems": 3}
 
 
 class WrongValueError(ValueError):
@@ -112,3 +126,179 @@ def kinds_of(annotation: Any) -> dict[str, Any]:  # noqa: ANN401 (a type)
 
 def is_section(annotation: Any) -> bool:  # noqa: ANN401 (a type)
     return isinstance(annotation, type) and issubclass(annotation, Section)
+
+
+class Text(str):
+    """A text that the user chose: an id, a name, a path."""
+
+    __slots__ = ()
+
+
+def single(value: object, expected: str) -> str:
+    if not isinstance(value, str):
+        what = "a list" if isinstance(value, list) else "a mapping"
+        raise wrong(f"{what} is given here", code="type", expected=expected)
+    if not value:
+        raise wrong("no value is given", code="no-value", expected=expected, fix="write one or remove the key")
+    return value
+
+
+def text(value: object) -> Text:
+    """Read a text on one line."""
+    word = single(value, "a text")
+    if CONTROL_CHARACTER.search(word):
+        raise wrong(f"`{shown(word)}` has a control character or a line break in it", expected="a text on one line")
+    return Text(word)
+
+
+def number_between(
+    expected: str, least: float = -float("inf"), most: float = float("inf")
+) -> Callable[[object], float]:
+    """Reader of a number strictly between two limits."""
+
+    def read(value: object) -> float:
+        word = single(value, expected)
+        try:
+            result = read_number(word)
+        except NotANumber as why:
+            raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
+        if not least < result < most:
+            raise wrong(f"{shown(word)} is out of range", code="range", expected=expected)
+        return result
+
+    return read
+
+
+def or_auto(read: Callable[[object], float]) -> Callable[[object], float | None]:
+    """Reader of a number that may also be ``auto`` (None)."""
+    return lambda value: None if value == "auto" else read(value)
+
+
+def known_word(word: str, allowed: tuple[str, ...]) -> str:
+    """Require a word from a list."""
+    if word not in allowed:
+        replaced = REPLACED.get(word)
+        fix = f"write `{replaced}`, which took its place" if replaced in allowed else suggestion(word, allowed)
+        raise wrong(f"`{shown(word)}` is not known", code="word", expected=_one_of(allowed), fix=fix)
+    return word
+
+
+def _one_of(allowed: tuple[str, ...]) -> str:
+    return allowed[0] if len(allowed) == 1 else f"one of {', '.join(allowed)}"
+
+
+def choice(allowed: tuple[str, ...]) -> Read:
+    values = [int(each) if each.isdecimal() else each for each in allowed]
+    return Read(lambda value: known_word(single(value, _one_of(allowed)), allowed), {"enum": values})
+
+
+def one_of(*allowed: str) -> Callable[[str], str]:
+    """Check of a word from a list, of which editors know the description alone."""
+    return lambda value: str(known_word(value, allowed))
+
+
+def _flag(value: object) -> bool:
+    word = single(value, "true or false").casefold()
+    if word not in FALSE + TRUE:
+        raise wrong(f"`{shown(word)}` is neither true nor false", code="word", expected="true or false")
+    return word in TRUE
+
+
+def schema_number(name: str, number: int, kind: str = "") -> Callable[[object], int]:
+    """Check of the number of a schema, the value of the key `name`."""
+
+    def read(value: object) -> int:
+        if str(value) != str(number):
+            message = f"this version of photostrip does not read schema {shown(str(value))}{kind}"
+            raise wrong(message, code="schema-number", expected=f"{name}: {number}")
+        return number
+
+    return read
+
+
+def whole(value: object) -> int:
+    expected = "a whole number"
+    if not isinstance(value, str) or not value:
+        raise wrong("no number is given here", code="type", expected=expected)
+    try:
+        result = read_number(value)
+    except NotANumber as why:
+        raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
+    if result != int(result):
+        raise wrong(f"{shown(value)} is not a whole number", code="number", expected=expected)
+    return int(result)
+
+
+def _axes(value: object) -> tuple[str, str, str]:
+    allowed = (GROUND_AXES, CARTESIAN_AXES)
+    expected = "a permutation of [east, north, up]; for geocentric coordinates [x, y, z]"
+    names = [single(name, expected) for name in (value if isinstance(value, list) else [value])]
+    if not any(sorted(names) == sorted(each) for each in allowed):
+        written = shown(", ".join(names))
+        raise wrong(f"[{written}] does not say which column is which", code="axes", expected=expected)
+    first, second, third = names
+    return first, second, third
+
+
+class Range(NamedTuple):
+    """Limits of a quantity: wide ones, that catch a wrong unit or a slip of the pen."""
+
+    least: float
+    most: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.least:g} to {self.most:g} {self.unit}".rstrip()
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies within the limits; never for NaN."""
+        return self.least <= value <= self.most
+
+    def scaled(self, scale: float, unit: str) -> Range:
+        """Return the limits in another unit, which is `scale` of this one."""
+        return Range(self.least / scale, self.most / scale, unit or self.unit)
+
+
+def bounded(limits: Range) -> Callable[[float], float]:
+    """Check of a number within limits."""
+
+    def check(value: float) -> float:
+        if not limits.holds(value):
+            raise wrong(f"{value:g} is out of range", code="range", expected=str(limits))
+        return value
+
+    return check
+
+
+def if_empty(value: object) -> object:
+    """Read a key whose entries are all commented out as an empty mapping."""
+    return {} if value == "" else value
+
+
+def quoted(words: tuple[str, ...]) -> str:
+    """List words as a sentence does."""
+    quoted = [f"`{word}`" for word in words]
+    return f"{', '.join(quoted[:-1])} or {quoted[-1]}"
+
+
+_read_number = number_between("a number")
+_read_not_negative = number_between("a number from 0 on", least=-SMALLEST_LENGTH)
+read_positive = number_between("a number larger than 0", least=SMALLEST_LENGTH)
+_read_fraction = number_between("a number between 0 and 1", least=0.0, most=1.0)
+Id = Annotated[str, Read(text, _ANY)]
+Words = Annotated[str, Read(text, {"type": "string", "minLength": 1})]
+Number = Annotated[float, Read(_read_number, _NUMBER)]
+NotNegative = Annotated[float, Read(_read_not_negative, {"type": "number", "minimum": 0})]
+Positive = Annotated[float, Read(read_positive, _POSITIVE)]
+Fraction = Annotated[float, Read(_read_fraction, _FRACTION)]
+PositiveOrAuto = Annotated[float | None, Read(or_auto(read_positive), {"anyOf": [AUTO, _POSITIVE]})]
+NumberOrAuto = Annotated[float | None, Read(or_auto(_read_number), {"anyOf": [AUTO, _NUMBER]})]
+Flag = Annotated[bool, Read(_flag, {"type": "boolean"})]
+Whole = Annotated[int, Read(whole, {"type": "integer"})]
+Pair = tuple[Number, Number]
+Triple = tuple[Number, Number, Number]
+Sigma3 = tuple[Positive, Positive, Positive]
+Axes = Annotated[tuple[str, str, str], Read(_axes, _AXES)]
+YAxis = Annotated[str, choice(("up", "down"))]
+Height = Annotated[str, choice(("ellipsoidal", "orthometric"))]
+FirstSchema = Annotated[Words, After(one_of("1"))]  # number of a schema that has not changed

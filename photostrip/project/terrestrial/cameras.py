@@ -6,13 +6,23 @@ from importlib import resources
 from typing import Annotated
 
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
-from photostrip.project.schema.values import FirstSchema, Id, Number, Words, bounded
+from photostrip.project.schema.sections import (
+    After,
+    Before,
+    FirstSchema,
+    Id,
+    Number,
+    Section,
+    Words,
+    bounded,
+    key,
+    length,
+    rule,
+    wrong,
+)
 from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
-from photostrip.project.yaml.parsing import parse, read_document
-from photostrip.project.yaml.reading import Reading
-from photostrip.project.yaml.tree import Node, Path
-from photostrip.project.yaml.validation import checked
+from photostrip.project.yaml.reading import Reading, checked
+from photostrip.project.yaml.tree import Node, Path, parse, read_document
 from photostrip.terrestrial.normal_case import Phototheodolite
 
 OWN_LIST = "phototheodolites.yaml"

@@ -9,8 +9,8 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, read_points
 from photostrip.formats.text.tables import Table
-from photostrip.project.schema.sections import After, Section, key, rule, wrong
-from photostrip.project.schema.values import (
+from photostrip.project.schema.sections import (
+    After,
     FirstSchema,
     Flag,
     Id,
@@ -18,10 +18,14 @@ from photostrip.project.schema.values import (
     Number,
     Pair,
     Range,
+    Section,
     Whole,
     Words,
     bounded,
+    key,
     one_of,
+    rule,
+    wrong,
 )
 from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import CameraOrName

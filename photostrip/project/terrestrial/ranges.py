@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Table
-from photostrip.project.schema.values import Range
+from photostrip.project.schema.sections import Range
 
 MILLIMETRES = {"mm": 1.0, "um": 1e-3}  # in a unit of image coordinates
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}  # in a unit of angles

@@ -18,8 +18,7 @@ from photostrip.project.terrestrial.ranges import MILLIMETRES, RADIANS
 from photostrip.project.terrestrial.series import Table, Wanted, read_series
 from photostrip.project.terrestrial.survey_file import Measurements, TerrestrialFile
 from photostrip.project.terrestrial.tables import SightingUnits, read_sightings
-from photostrip.project.yaml.reading import Reading
-from photostrip.project.yaml.validation import valid_section
+from photostrip.project.yaml.reading import Reading, valid_section
 from photostrip.terrestrial.accuracy import Theodolite
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import SIDES, Phototheodolite, StereoPair, ground_from_photo, normal_pair

@@ -5,8 +5,24 @@ from __future__ import annotations
 from typing import Annotated
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
-from photostrip.project.schema.values import Axes, FirstSchema, Id, Number, Positive, Words, YAxis, bounded, one_of
+from photostrip.project.schema.sections import (
+    After,
+    Axes,
+    Before,
+    FirstSchema,
+    Id,
+    Number,
+    Positive,
+    Section,
+    Words,
+    YAxis,
+    bounded,
+    key,
+    length,
+    one_of,
+    rule,
+    wrong,
+)
 from photostrip.project.terrestrial.cameras import CameraOrName
 from photostrip.project.terrestrial.ranges import (
     BASE,

@@ -11,7 +11,7 @@ import pyproj
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from photostrip.report.commands.check import check_sections
 from photostrip.report.page.parts import Table
 from photostrip.report.page.text import to_text

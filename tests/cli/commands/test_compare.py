@@ -16,7 +16,7 @@ from photostrip.errors import InputError
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.result_lines import line_finder
 from photostrip.formats.text import writing
-from photostrip.project.profiles.tolerances import load_tolerances
+from photostrip.project.tolerances import load_tolerances
 from photostrip.report.page.junit import Case, to_junit
 from tests.loops import nonempty
 from tests.results import by_rows, case, in_tables

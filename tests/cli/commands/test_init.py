@@ -11,7 +11,7 @@ import pytest
 
 from photostrip import __version__
 from photostrip.cli.main import main
-from photostrip.project.checks.check import check_project
+from photostrip.project.check import check_project
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.simulation import SimulationFile
 from photostrip.project.template import template_files

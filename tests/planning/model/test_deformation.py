@@ -21,6 +21,7 @@ from photostrip.planning.deformation import (
     rigorous_covariance,
     surface_of_elements,
 )
+from photostrip.planning.model_plan import source_example
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import ground_errors, orientation_factors
 from tests.vectors import cases
@@ -190,3 +191,16 @@ def test_t_values_are_student_distributed_without_deformation_and_see_a_real_one
     seen = np.mean([np.abs(fit.t_values) > fit.critical() for fit in found], axis=0)
     assert seen[0] > 0.9
     assert seen[1] < 0.12
+
+
+def test_the_worked_example_beside_what_six_points_give() -> None:
+    rows = {(row.place, row.quantity): row for row in source_example()}
+    assert [row.printed for row in rows.values()] == [35, 23, 22, 16]
+    assert [row.formula for row in rows.values()] == pytest.approx([35, 23, 21, 16])
+    assert [row.assumed for row in rows.values()] == pytest.approx([35.4, 22.9, 21.2, 15.8], abs=0.06)
+    # var(c) from the orientation: 1/2 + 3/4 + 2/3 left, 1/2 + 2/3 right, 1/2 in the middle; an x parallax counts 1
+    side, middle = rows[SIDE, "height"], rows[CENTRAL, "height"]
+    assert (side.left, side.right) == pytest.approx((10 * np.sqrt(35 / 12), 10 * np.sqrt(13 / 6)))
+    assert (middle.left, middle.right) == pytest.approx((10 * np.sqrt(1.5),) * 2)
+    assert side.assumed > 1.3 * side.left
+    assert rows[SIDE, "plan"].assumed > 1.8 * rows[SIDE, "plan"].left

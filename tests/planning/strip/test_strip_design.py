@@ -216,3 +216,19 @@ def test_a_whole_design() -> None:
     assert [each.method for each in report.needed] == [SIMILARITY, BUNDLE]
     assert report.placed is not None
     assert len(report.placed.spots) == 1
+
+
+def test_measured_perspective_centres_help_the_bundle_only() -> None:
+    strip = strip_of(12)
+    plain, with_gnss = ControlLayout("", kind="corners"), ControlLayout("", kind="corners", gnss=(0.05, 0.05, 0.08))
+    spots = spots_of(plain, 12, 3)
+    without, offset, absolute = (
+        worst(accuracy(strip, layout, spots, BUNDLE))
+        for layout in (plain, with_gnss, replace(with_gnss, gnss_offset=False))
+    )
+    assert absolute[1] <= offset[1] < 0.5 * without[1]
+    for method in (SIMILARITY, "degree 1"):
+        assert worst(accuracy(strip, plain, spots, method)) == worst(accuracy(strip, with_gnss, spots, method))
+    # without any offset the centres alone are control enough, with one they are too, but not in the plan's place
+    none = ControlLayout("", kind="points", gnss=(0.05, 0.05, 0.08), gnss_offset=False)
+    assert outcome(strip, none, SIMILARITY).accuracy is None

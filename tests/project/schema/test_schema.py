@@ -15,9 +15,8 @@ from photostrip.project.schema.ground import Output
 from photostrip.project.schema.processing import Processing
 from photostrip.project.schema.project_file import ProjectFile, Tolerances
 from photostrip.project.schema.sections import Section
-from photostrip.project.yaml.parsing import parse
-from photostrip.project.yaml.tree import Node, Place
-from photostrip.project.yaml.validation import checked, homes
+from photostrip.project.yaml.reading import checked, homes
+from photostrip.project.yaml.tree import Node, Place, parse
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 

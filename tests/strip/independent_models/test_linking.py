@@ -149,25 +149,3 @@ def test_a_mirrored_model_is_named(models: tuple[str, ...]) -> None:
         formed_of(replace(measured, xyz=xyz))
     assert told.value.faults[0].code == "mirrored-model"
     assert ", ".join(models) in told.value.faults[0].message
-
-
-@pytest.mark.slow
-def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
-    true = truth(1 + 1, 4, 3)
-    rng, found, cases = np.random.default_rng(4), 0, 150
-    for _ in range(cases):
-        measured = true.measured(rng.normal(size=(len(true.model), 3)))
-        models = models_of(strip_of(measured), measured, LinkSettings())
-        shared = linking.common(models)
-        none = np.zeros(len(shared.link), bool)
-        plain = linking.screen_links(shared, models, LinkSettings("none"), none)
-        size = linking.detectable(shared, plain)[0]
-        solved = plain.solved
-        reduced = solved.weight - solved.weight @ solved.design @ solved.cofactors[
-            shared.link] @ solved.design.transpose(0, 2, 1) @ solved.weight  # fmt: skip
-        weak = np.linalg.eigh(reduced[0])[1][:, 0]
-        xyz = models.xyz.copy()
-        xyz[shared.before[0]] += size * weak
-        value, _, _ = linking.studentised(shared, linking.solve(shared, replace(models, xyz=xyz), ~none), ~none)
-        found += value[0] > 16.27  # chi-square of three degrees of freedom at 0.001
-    assert 0.70 < found / cases < 0.90

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.strip.relative_orientation import standard_points
@@ -22,8 +20,6 @@ if TYPE_CHECKING:
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]
-
-LENGTHS = st.floats(40.0, 300.0)
 
 
 SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
@@ -119,26 +115,3 @@ def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     ratios = [1.0, expected["by_over_bx"], expected["bz_over_bx"]]
     given_rotation = attitude(expected["alpha_omega_kappa_right_deg"])[0]
     assert np.allclose(base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
-
-
-@given(LENGTHS, LENGTHS)
-def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
-    f = 153.0
-    t = standard_points.dependent_from_base(b)
-    found = t @ standard_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
-    expected = np.zeros((5, 5))
-    np.fill_diagonal(
-        expected,
-        [
-            2 / 3 + f**2 / a**2 + 3 * f**4 / (4 * a**4),
-            f**2 / (2 * a**2),
-            2 / (3 * b**2),
-            f**2 / (a**2 * b**2),
-            3 * f**2 / (4 * a**4),
-        ],
-    )
-    expected[1, 3] = expected[3, 1] = f**2 / (2 * a**2 * b)
-    expected[0, 2] = expected[2, 0] = 1 / (3 * b)
-    expected[0, 4] = expected[4, 0] = -f * (2 * a**2 + 3 * f**2) / (4 * a**4)
-    scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
-    assert np.allclose(found / scale, expected / scale, rtol=0, atol=1e-9)

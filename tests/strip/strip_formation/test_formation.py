@@ -248,24 +248,6 @@ def test_a_wrong_pass_point_is_rejected_and_does_little_harm(transfer: str, extr
     assert harm.max() < 0.25 * share
 
 
-# ----------------------------------------------------------------------------- points on more or fewer photos
-
-
-@pytest.mark.parametrize(("kept", "renamed"), [("p4_0", "p20_1"), ("p4_1", "p23_0")])
-def test_of_two_points_under_one_id_that_lie_far_apart_the_one_in_more_models_stays(kept: str, renamed: str) -> None:
-    flown = fly(11, 24, sigma=5 * MICROMETRE, extra=20)
-    number, other = flown.at[kept], flown.at[renamed]
-    observations = flown.observations
-    two = replace(observations, point=np.where(observations.point == other, number, observations.point))
-    before, strip = formed(flown), formed(replace(flown, observations=two))
-    model = {each: int(before.model_count[before.point == each][0]) for each in (number, other)}
-    row, stays = np.flatnonzero(strip.point == number)[0], number if model[number] >= model[other] else other
-    assert strip.model_count[row] == max(model.values())
-    assert strip.xyz[row] == pytest.approx(before.xyz[before.point == stays][0], abs=1e-9)
-    assert other not in strip.point
-    assert np.isnan(strip.model_xyz).any(axis=1).sum() == min(model.values())
-
-
 # ---------------------------------------------------------------------------------------------- refused
 
 

@@ -22,7 +22,6 @@ from photostrip.strip.absolute_orientation import Targets
 from photostrip.strip.fitted_strip import Misclosures
 from photostrip.strip.gross_errors.control_screening import FoundErrors, reliability
 from photostrip.strip.gross_errors.control_search import StripAtControl, adjust
-from tests.loops import nonempty
 from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -154,21 +153,6 @@ def test_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None
     after, _, sigma = squares(strip, (5,))
     limit = np.sqrt(f_distribution.isf(whole.level, 1, 16))
     assert detectable[1, 2] == pytest.approx((limit + norm.ppf(0.8)) * sigma[0] * max(1, after / 16) ** 0.5, rel=1e-5)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_no_exchange_of_one_part_explains_more_than_the_exchanged_ones(seed: int) -> None:
-    strip = drawn(seed, worse=5.0)
-    whole = adjusted_jointly(strip)
-    given = tuple(np.random.default_rng(seed).permutation(24)[:16].tolist())
-    out = whole.exchanged(given)
-    assert not whole.allows(given)
-    assert whole.allows(out)
-    least = squares(strip, out)[0]
-    for part in nonempty([each for each in whole.parts if set(each) <= set(out)]):
-        rest = tuple(column for column in out if column not in part)
-        for other in nonempty([each for each in whole.parts if len(each) == len(part) and not set(each) & set(out)]):
-            assert squares(strip, (*rest, *other))[0] >= least * (1 - 1e-6)
 
 
 # ---------------------------------------------------------------------------------------------------------- strips

@@ -7,42 +7,46 @@ coordinate gets and from where, and what became of every row of every table.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.control import ControlTable
+from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.measured.models import ModelTable
 from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.tables import Table
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
-from photostrip.pipeline.inputs import BUNDLE, Strip, require_whole
+from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, Strip, require_whole
 from photostrip.pipeline.plausibility import gate
 from photostrip.points import PhotoPoints, locate
-from photostrip.project.checks.models import (
-    counts_of_models,
-    links_of_models,
-    photos_of_points,
-    points_of_strip,
-    sigma_of,
-    source_of,
-)
-from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
 from photostrip.project.loading import Project, read_project
-from photostrip.project.tables import Tables
-from photostrip.project.yaml.tree import fault_at
+from photostrip.project.tables import Tables, rays
+from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.strip.image_coordinates import corrections
-from photostrip.units import MILLIMETRES
+from photostrip.units import MICROMETRES, MILLIMETRES
 
 LEAST_SHARED = 4  # points that orient a photo
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
+IN_NO_STRIP = "its photo belongs to no strip"
+ONCE = "the point is measured on one photo only"
+NO_NEIGHBOUR = "the point is not on two neighbouring photos of one strip"
+IN_NO_MODEL = "its model belongs to no strip"
+NO_MODEL = "not measured in any model of the strips"
+OFF = "switched off (use: off)"
+NO_BUNDLE = "only the bundle adjustment uses it"
+NOT_MEASURED = "not measured on any photo of the strips"
 
 
 @dataclass(frozen=True)
@@ -343,3 +347,236 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
             "sigma_from": [(here if its else source) if counts else None for _, its, _, counts in of_axes],
             "photos": photos.get(name, 0),
         }
+
+
+def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:
+    """Refuse neighbouring models that cannot be linked, and models of the other hand."""
+    from photostrip.pipeline.strips.models import form_models  # strips of photos need none of it
+
+    for number, strip in enumerate(models.strips):
+        try:
+            form_models(strip, models.points, project.settings)
+        except GeometryError as error:
+            yield fault_at(project.tree, ("strips", number, "id"), str(error), error.code)
+        except np.linalg.LinAlgError as error:
+            message = (
+                f"neighbouring models of strip {strip.id} cannot be linked: their coordinates contradict each other"
+            )
+            yield fault_at(project.tree, ("strips", number, "id"), f"{message} ({error})", "singular")
+        except InputError as error:
+            for fault in error.faults:
+                words = {"expected": fault.expected, "fix": fault.fix}
+                yield fault_at(project.tree, ("models", "file"), fault.message, fault.code, **words)
+
+
+def source_of(project: Project, path: tuple[str | int, ...]) -> Document | None:
+    """Say where a value of the project stands: in which file, line and key; None when it is not given."""
+    if not project.tree.has(*path):
+        return None
+    place = project.tree.place_of(path)
+    return {"source": "default", "file": place.file, "line": place.line, "key": key_path(path)}
+
+
+def counts_of_models(models: MeasuredModels) -> Document:
+    """Count models, their points and their perspective centres."""
+    points = models.points.node < len(models.points.point_ids)
+    return {
+        "models": sum(len(strip.models) for strip in models.strips),
+        "model_points": int(points.sum()),
+        "model_centers": int((~points).sum()),
+    }
+
+
+def sigma_of(
+    project: Project, section: str, tables: Iterable[Measurements | ModelTable | None], sigma: Floats
+) -> Document:
+    """Say which standard deviations (mm) the measured coordinates get, and how many rows of the tables have some."""
+    read = [each for each in tables if each is not None]
+    rows = sum(len(each.table) for each in read)
+    stated = sum(int((~np.isnan(each.sigma).any(axis=1)).sum()) for each in read)
+    return {
+        "rows_with_own": stated,
+        "rows_with_default": rows - stated,
+        "default_from": source_of(project, (section, "sigma")),
+        "smallest_um": float((sigma * MICROMETRES).min()) if len(sigma) else None,
+        "largest_um": float((sigma * MICROMETRES).max()) if len(sigma) else None,
+    }
+
+
+def points_of_strip(models: MeasuredModels, number: int) -> Numbers:
+    """Points that the models of a strip hold, by number."""
+    points = models.points
+    known = set(models.strips[number].models)
+    inside = np.array([name in known for name in points.model_ids], bool)[points.model]
+    return np.unique(points.node[inside & (points.node < len(points.point_ids))])
+
+
+def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:
+    shown = {
+        name: strip.photos[place : place + 2] for strip in models.strips for place, name in enumerate(strip.models)
+    }
+    points = models.points
+    found = {name: set[str]() for name in points.point_ids}
+    for model, node in zip(points.model.tolist(), points.node.tolist(), strict=True):
+        if node < len(points.point_ids):
+            found[points.point_ids[node]].update(shown[points.model_ids[model]])
+    return found
+
+
+class Reason(NamedTuple):
+    """Why rows are not used, which of them, and whose they are."""
+
+    why: str
+    rows: Flags
+    ids: Sequence[str]
+    of_rows: Numbers  # which of the ids each row has
+
+
+def observations_used(inputs: Inputs) -> Numbers:
+    """Return the strip in which each image point takes part, shape (n,); -1 where no neighbouring photo shows it."""
+    observations = inputs.observations
+    places = {photo: (i, j) for i, strip in enumerate(inputs.strips) for j, photo in enumerate(strip.photos)}
+    strip, place = np.array([places[name] for name in observations.photo_ids], np.intp).reshape(-1, 2).T
+    strip, place = strip[observations.photo], place[observations.photo]
+    # a photo's number in one long row of all strips, with a gap between strips: neighbours differ by one
+    starts = np.cumsum([0, *(len(each.photos) + 1 for each in inputs.strips)])
+    position = starts[strip] + place
+    key = observations.point * (int(starts[-1]) + 1) + position
+    present = np.sort(key)
+
+    def shown(wanted: Numbers) -> Flags:
+        at = np.searchsorted(present, wanted)
+        return np.asarray(present[np.minimum(at, len(present) - 1)] == wanted)
+
+    if not len(key):
+        return np.zeros(0, np.intp)
+    return np.where(shown(key - 1) | shown(key + 1), strip, -1)
+
+
+def gaps_of(inputs: Inputs, used: Numbers) -> list[str]:
+    """Name the points measured on two photos or more, of which no two are neighbours in a strip.
+
+    used: what ``observations_used`` returns.
+    """
+    observations = inputs.observations
+    paired = np.zeros(len(observations.point_ids), bool)
+    paired[observations.point[used >= 0]] = True
+    free = tuple(strip.id for strip in inputs.strips if not strip.listed)
+    paired[observations.point[observations.places(free) >= 0]] = True  # neighbours are yet to be found
+    count = np.bincount(observations.point, minlength=len(observations.point_ids))
+    return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
+
+
+def table_rows(project: Project, tables: Tables, used: Numbers) -> list[Document]:
+    """Count what became of the rows of each table; used and unused rows add up to all rows.
+
+    The keys are ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line.
+    """
+    inputs = project.inputs
+    photos = {photo for strip in inputs.strips for photo in strip.photos}
+    if tables.models is not None and inputs.models is not None:
+        return model_rows(tables, inputs.models)
+    found = []
+    bundle = project.settings.together
+    apart = set() if bundle else set(gaps_of(inputs, used))  # a bundle takes points of any two photos
+    control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
+    count: dict[str, int] = {}
+    if tables.observations is not None:
+        count = rays(tables.observations, photos)
+        found += _measured(tables.observations, photos, count, apart, control if bundle else set())
+    if (marks := tables.fiducials) is not None:
+        reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
+        found += _blocks(marks.table, reasons, marks.times)
+    if bundle:  # and control of a single one
+        count = {name: max(number, 2) for name, number in count.items()}
+    found += [_given(read, count, apart) for read in tables.control if read is not None]
+    found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
+    return found
+
+
+def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
+    """Count what became of the rows of each table of a project of independent models, as ``table_rows``."""
+    found = []
+    known = set(models.points.model_ids)
+    read = tables.models
+    for each in () if read is None else (read.points, read.centers):
+        if each is not None:
+            reasons = [_outside(IN_NO_MODEL, each.model_ids, known, each.models)]
+            found.append(_block(each.table, reasons))
+    points = set(models.points.point_ids)
+    for control in tables.control:
+        if control is not None:
+            missing = _outside(NO_MODEL, control.ids, points)
+            off = missing._replace(why=OFF, rows=~control.used)
+            reasons = [off, missing._replace(rows=control.used & missing.rows)]
+            found.append(_block(control.table, reasons))
+    return found
+
+
+def _outside(why: str, ids: Sequence[str], known: set[str], of_rows: Numbers | None = None) -> Reason:
+    """Rows whose id is not known; without `of_rows` each row has an id of its own."""
+    of_rows = np.arange(len(ids)) if of_rows is None else of_rows
+    rows = np.array([name not in known for name in ids], bool)[of_rows]
+    return Reason(why=why, rows=rows, ids=ids, of_rows=of_rows)
+
+
+def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
+    outside = _outside(IN_NO_STRIP, read.ids, photos)
+    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(read.ids), bool)
+    reasons = [
+        outside,
+        outside._replace(why=OFF, rows=~outside.rows & off),
+        outside._replace(why=NO_BUNDLE, rows=~outside.rows & ~off & (not bundle)),
+    ]
+    return _block(read.table, reasons)
+
+
+def _measured(
+    read: Measurements, photos: set[str], count: dict[str, int], gaps: set[str], whole: set[str]
+) -> list[Document]:
+    """Sort the rows of measured points by what becomes of them."""
+    outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
+    once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
+    apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
+    ids: Document = {"ids": read.target_ids, "of_rows": read.target}
+    reasons = [
+        outside,
+        Reason(why=ONCE, rows=~outside.rows & once, **ids),
+        Reason(why=NO_NEIGHBOUR, rows=~outside.rows & ~once & apart, **ids),
+    ]
+    return _blocks(read.table, reasons, read.times)
+
+
+def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
+    number = np.array([count.get(name, 0) for name in read.ids], np.intp)
+    apart = np.array([name in gaps for name in read.ids], bool)
+    ids: Document = {"ids": read.ids, "of_rows": np.arange(len(read.ids))}
+    reasons = [
+        Reason(why=OFF, rows=~read.used, **ids),
+        Reason(why=NOT_MEASURED, rows=read.used & (number == 0), **ids),
+        Reason(why=ONCE, rows=read.used & (number == 1), **ids),
+        Reason(why=NO_NEIGHBOUR, rows=read.used & (number > 1) & apart, **ids),
+    ]
+    return _block(read.table, reasons)
+
+
+def _blocks(table: Table, reasons: list[Reason], times: Numbers) -> list[Document]:
+    """Count the rows of each file of a table; `times` says of how many rows of the file each of them is made."""
+    found = []
+    for file, inside in table.files:
+        of_file = [each._replace(rows=each.rows & inside) for each in reasons]
+        found.append(_block(table, of_file, np.where(inside, times, 0)) | {"file": file})
+    return found
+
+
+def _block(table: Table, reasons: list[Reason], times: Numbers | None = None) -> Document:
+    times = np.ones(len(table.lines), np.intp) if times is None else times
+    unused: list[Document] = []
+    for reason in reasons:
+        at = np.flatnonzero(reason.rows)
+        if len(at):
+            ids = list(dict.fromkeys(reason.ids[code] for code in reason.of_rows[at].tolist()))
+            line = int(table.lines[at[0]])
+            unused.append({"why": reason.why, "rows": int(times[at].sum()), "ids": ids, "first_line": line})
+    rows = int(times.sum())
+    return {"file": table.file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}

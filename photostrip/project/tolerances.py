@@ -10,8 +10,7 @@ from typing import Annotated, Any, TypeVar
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.project.schema.sections import Read, Section, key, wrong
-from photostrip.project.schema.values import Flag, Words, schema_number
+from photostrip.project.schema.sections import Flag, Read, Section, Words, key, schema_number, wrong
 from photostrip.project.yaml.reading import read_file
 
 SCHEMA_NUMBER = 1
