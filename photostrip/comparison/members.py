@@ -7,18 +7,6 @@ from collections.abc import Iterator
 from photostrip.comparison.quantities import names_of
 from photostrip.notes import Document
 
-# What is ours, what the other numbers are made of, and what is made of them.
-LEFT_OUT = (
-    "version",
-    "statement",
-    "certificate",
-    "residuals",
-    "parallaxes",
-    "link_residuals",
-    "covariances",
-    "fiducial_marks",
-)
-
 WORDS = {"photos": "photo", "points": "point", "control": "given point", "strips": "strip", "models": "model"}
 Member = tuple[str, str, str]  # block, id, what it is
 

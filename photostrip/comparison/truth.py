@@ -151,7 +151,7 @@ def _errors(rejected: Sequence[Document], planted: Sequence[Document]) -> Docume
     wrong: set[tuple[str, str]] = set()
     missed = []
     for error in planted:
-        photo, points = error.get("photo", ""), [error["point"], *([error["other"]] if error.get("other") else [])]
+        photo, points = error["photo"] or "", [error["point"], *([error["other"]] if error.get("other") else [])]
         wrong |= {(photo, point) for point in points}
         named = any((photo, point) in rays for point in points) if photo else error["point"] in given
         if not named:

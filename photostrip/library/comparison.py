@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from photostrip.comparison import Tolerances, compare_results
-from photostrip.comparison.members import LEFT_OUT
 from photostrip.errors import Fault, InputError
 from photostrip.library.result import RESULT, Result
 from photostrip.notes import Document, counted
+from photostrip.result.description import LEFT_OUT
 from photostrip.result.table import plain_of
 
 BASELINE = "baseline.json"

@@ -40,7 +40,7 @@ class Result:
         read: Sequence[str | PathLike[str]] = (),
         exports: Sequence[str] = (),
     ) -> None:
-        self.document: Document = document if not isinstance(document["points"], dict) else _checked(document)
+        self.document: Document = document if not isinstance(document.get("points"), dict) else _checked(document)
         """The content of result.json: blocks of keys, and tables; ``document["points"]["x"]`` is an array."""
         self._read = read
         self.computed = computed

@@ -14,6 +14,17 @@ SCHEMA = 2  # number of the format of result.json
 LIST = " list"
 KINDS = {"text", "word", "count", "flag", "any"}
 BESIDE = {"refined", "truth"}  # what is described and not in result.json
+# What a baseline is without: what is ours, what the other numbers are made of, and what is made of them.
+LEFT_OUT = (
+    "version",
+    "statement",
+    "certificate",
+    "residuals",
+    "parallaxes",
+    "link_residuals",
+    "covariances",
+    "fiducial_marks",
+)
 BRACES = re.compile(r"\{([^}]*)\}")
 
 

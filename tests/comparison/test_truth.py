@@ -147,7 +147,7 @@ def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
     whole = photostrip.compare(result, simulation.truth)
     assert whole.document["errors"] == {"planted": 3, "missed": [], "sound_rejected": 0}
     document = copy.deepcopy(result.document)
-    assert document["rejected"]["point"]
+    assert len(document["rejected"]["point"])
     document["rejected"] = {key: [] for key in document["rejected"]}
     against = photostrip.compare(photostrip.Result(document), simulation.truth)
     assert [each["kind"] for each in against.document["errors"]["missed"]] == ["image", "swap", "control"]

@@ -96,7 +96,6 @@ FIXED = {
         "photo_scale": float,
     },
     "polynomials": [{"degree": int}],
-    "polynomial_terms": [{"strip": str, "axis": str, "term": str, "coefficient": float, "sigma": float}],
     "polynomial_evidence": [{"strip": str, "group": str, "degree": int}],
 }
 

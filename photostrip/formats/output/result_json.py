@@ -6,11 +6,10 @@ import json
 from collections.abc import Collection, Iterator
 from typing import Any
 
-from photostrip.comparison.members import LEFT_OUT
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.notes import Document
-from photostrip.result.description import SCHEMA
+from photostrip.result.description import LEFT_OUT, SCHEMA
 from photostrip.result.reading import read
 from photostrip.result.table import Table, in_frame
 from photostrip.visible import visible_json

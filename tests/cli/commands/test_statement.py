@@ -77,7 +77,7 @@ def test_the_exit_code_says_whether_it_is_met(options: list[str], code: int) -> 
 
 
 def test_fewer_points_end_with_1(result: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    few = block(plan=GOOD | {"count": 12, "largest": 0.3})
+    few = block(plan=GOOD | {"count": 12, "largest": 0.3}, height=result["statement"]["height"])
     written(result | {"statement": few})
     assert main(["statement", "result.json", "--quiet"]) == 1
     assert "DOES NOT MEET THE MINIMUM" in capsys.readouterr().out
