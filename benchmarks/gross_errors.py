@@ -39,7 +39,7 @@ from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
-from photostrip.strip.gross_errors.control_screening import EITHER, WRONG_IMAGE  # noqa: E402
+from photostrip.strip.control_screening import EITHER, WRONG_IMAGE  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:

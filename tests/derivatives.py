@@ -9,9 +9,8 @@ import numpy as np
 
 from photostrip.pipeline.precision import fitted
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.absolute import OrientedStrip
+from photostrip.pipeline.strips.absolute import OrientedPhotos, OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.pipeline.strips.photos_on_control import OrientedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
 from photostrip.strip.relative_orientation.orientation import RelativeSettings

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.formats.output.simulation import model_strips
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates.corrections import ImageCorrectionSettings
+from photostrip.strip.corrections import ImageCorrectionSettings
 
 if TYPE_CHECKING:
     from photostrip.points import ModelPoints

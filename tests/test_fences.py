@@ -23,6 +23,7 @@ FENCES = {
     "jinja2": ("report/*",),
     "json": FILES,
     "laspy": ("foreign/historix_submission.py",),
+    "pebble": ("batch/*",),
     "pydantic": ("project/*",),
     "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
     "rich": ("report/page/console.py", "report/page/progress.py"),

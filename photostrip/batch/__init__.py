@@ -4,7 +4,7 @@
 
     arguments -> projects and the names of their results (selection)
        -> unchanged since last time? (result_folder)
-       -> tasks -> processes of this machine (local_pool, worker_process) or of others (cluster, cluster_worker, parcel)
+       -> tasks -> processes of this machine (pool) or of others (cluster, parcel)
        -> answers: files and a line of the summary (evaluation, outcomes)
        -> written by this process alone (result_folder)
        -> summary (run)

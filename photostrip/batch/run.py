@@ -5,12 +5,12 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from photostrip.batch.local_pool import Executor
 from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
+from photostrip.batch.pool import Executor, answers, do_nothing
 from photostrip.batch.result_folder import ResultFolder
 from photostrip.batch.selection import ChosenProject
 from photostrip.batch.tasks import Answer, Task
@@ -55,18 +55,6 @@ def on_signals(stop: Stop) -> Iterator[Stop]:
             signal.signal(each, before[each])
 
 
-@dataclass
-class Batch:
-    # the line of the summary of each project, in the order in which the user named them
-    outcomes: list[Document] = field(default_factory=list)
-    unchanged: int = 0
-
-    @property
-    def exit_code(self) -> int:
-        """That of the worst project: the highest."""
-        return max((each["exit_code"] for each in self.outcomes), default=0)
-
-
 class Run:
     """One batch: which projects must be computed, what is written, what became of each.
 
@@ -86,13 +74,21 @@ class Run:
     ) -> None:
         self.projects, self.overrides, self.folder = projects, tuple(overrides), folder
         self.force, self.strict, self.html = force, strict, html
-        self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
+        # the line of the summary of each project, in the order in which the user named them
+        self.outcomes = [named(not_run(), chosen, written=folder is not None) for chosen in projects]
+        self.unchanged = 0
 
-    def go(self, executor: Executor, listener: Listener, stop: Stop) -> Batch:
+    @property
+    def exit_code(self) -> int:
+        """That of the worst project: the highest."""
+        return max((outcome["exit_code"] for outcome in self.outcomes), default=0)
+
+    def go(
+        self, executor: Executor, listener: Listener, stop: Stop, begun: Callable[[Task], None] = do_nothing
+    ) -> None:
         """Compute what must be computed."""
-        for answer in executor.answers(self._tasks(listener, stop), stop):
+        for answer in answers(executor, self._tasks(listener, stop), stop, begun):
             self._write(answer, listener, stop)
-        return self.batch
 
     def files_read(self) -> list[str]:
         """Return every file that the results were made from, and the project files of those without a result."""
@@ -120,7 +116,7 @@ class Run:
             return None
         outcome = self.folder.unchanged(chosen, with_page=self.html)
         if outcome is not None:
-            self.batch.unchanged += 1
+            self.unchanged += 1
             return outcome
         refused = self.folder.refused(chosen)
         return None if refused is None else failure(FAULTY, refused)
@@ -142,7 +138,7 @@ class Run:
         line = named(outcome, chosen, written=self.folder is not None)
         if outcome["status"] in VERDICTS:
             line["exit_code"] = exit_code(outcome["status"], strict=self.strict)
-        self.batch.outcomes[chosen.number] = line
+        self.outcomes[chosen.number] = line
         listener(line, answer)
 
 

@@ -33,7 +33,6 @@ class Answer:
     )  # content of its result files by name; none after a failure
     # SHA-256 of every file read, by path; None for a file that would have been read if it were there
     inputs: dict[str, str | None] = field(default_factory=dict)
-    megabytes: float = 0.0
     trace: str = ""
 
 

@@ -14,7 +14,7 @@ from contextvars import ContextVar
 
 import typer
 
-from photostrip.cli.stdout import Format, ascii_only
+from photostrip.cli.stdout import ascii_only
 from photostrip.errors import EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.visible import visible, visible_json
 
@@ -79,13 +79,13 @@ def failures_as(form: str) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except (InputError, GeometryError, OSError) as error:
-        if form not in {Format.JSON, Format.GITHUB}:
+        if form not in {"json", "github"}:
             raise
         from photostrip.report.page import messages
 
         failure = as_fault(error) if isinstance(error, OSError) else error
         findings = messages.findings_of(failure)
-        if form == Format.GITHUB:
+        if form == "github":
             sys.stdout.write(messages.annotated(findings))
         else:
             document = messages.as_document(findings, failure.exit_code)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from photostrip.cli.stdout import Format
+from photostrip.report.sections.accuracy_report import SectionName
 
 
 def _keys(incomplete: str) -> list[str]:
@@ -66,8 +68,26 @@ Verbose = Annotated[
 ]
 
 
+Sections = Annotated[
+    list[SectionName] | None,
+    typer.Option(
+        "--section",
+        metavar="NAME",
+        help=f"Print this section, with whole tables; may be repeated. NAME: {', '.join(SectionName)}.",
+    ),
+]
+
+
 def require_target(depfile: Path | None, output: Path | None) -> None:
     """Refuse a rule for make without a file to make."""
     if depfile is not None and output is None:
         message = "a rule for make needs a target: give --output as well"
         raise typer.BadParameter(message, param_hint="--depfile")
+
+
+def refuse_sections(names: Sequence[SectionName] | None, answer: str) -> None:
+    """Refuse sections where the answer (a format, or what it is) has none."""
+    if names and answer not in {"text", "md"}:
+        raise typer.BadParameter(
+            f"only a report as text or Markdown has sections, not {answer}", param_hint="--section"
+        )

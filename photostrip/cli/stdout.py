@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import typer
 
@@ -15,44 +14,10 @@ if TYPE_CHECKING:
     from photostrip.report.sections.accuracy_report import SectionName
 
 Document = dict[str, Any]
-
-
-class Format(StrEnum):
-    """Forms in which a report is printed."""
-
-    TEXT = "text"
-    JSON = "json"
-    MD = "md"
-    GITHUB = "github"
-
-
-class StatementFormat(StrEnum):
-    """Forms in which a statement and a verification are printed."""
-
-    TEXT = "text"
-    JSON = "json"
-    MD = "md"
-
-
-class BatchFormat(StrEnum):
-    """Forms in which the summary of a batch is printed."""
-
-    TEXT = "text"
-    CSV = "csv"
-    JSON = "json"
-    JUNIT = "junit"
-    MD = "md"
-    GITHUB = "github"
-
-
-class CompareFormat(StrEnum):
-    """Forms in which a comparison is printed."""
-
-    TEXT = "text"
-    JSON = "json"
-    MD = "md"
-    JUNIT = "junit"
-    GITHUB = "github"
+Format = Literal["text", "json", "md", "github"]
+StatementFormat = Literal["text", "json", "md"]
+BatchFormat = Literal["text", "csv", "json", "junit", "md", "github"]
+CompareFormat = Literal["text", "json", "md", "junit", "github"]
 
 
 class Parts(NamedTuple):
@@ -63,7 +28,7 @@ class Parts(NamedTuple):
     names: Sequence[SectionName] = ()  # these sections
 
 
-ENDINGS = {".txt": Format.TEXT, ".json": Format.JSON, ".md": Format.MD}
+ENDINGS: dict[str, Format] = {".txt": "text", ".json": "json", ".md": "md"}
 
 
 def ascii_only() -> bool:
@@ -92,7 +57,7 @@ def print_sections(title: str, sections: Iterable[Section], width: int | None = 
 
 def print_result(document: Document, form: Format, width: int | None, parts: Parts) -> None:
     """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
-    if form is Format.TEXT:
+    if form == "text":
         from photostrip.report.page.console import page_width
 
         print_sections(*_report(document, parts, width or page_width()), width, markdown=False)
@@ -112,16 +77,16 @@ def report_text(
     """Return the report of a result as text, without colours."""
     from photostrip.report.page import layout, text
 
-    if form is Format.JSON:
+    if form == "json":
         from photostrip.formats.output.result_json import to_json
 
         return to_json(document, ascii_only=ascii_letters)
-    if form is Format.GITHUB:
+    if form == "github":
         from photostrip.report.page.messages import annotated, result_findings
 
         return annotated(result_findings(document))
     title, sections = _report(document, parts, width or layout.USUAL)
-    if form is Format.MD:
+    if form == "md":
         return text.to_markdown(title, sections, ascii_only=ascii_letters)
     return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_letters)
 
@@ -141,4 +106,4 @@ def form_of(path: Path, option: str = "--output") -> Format:
         rather = ", or give --format" if option == "--output" else ""
         message = f"nothing is written as '{path.suffix}': the name may end in {known}{rather}"
         raise typer.BadParameter(message, param_hint=option)
-    return ENDINGS.get(path.suffix.lower(), Format.TEXT)
+    return ENDINGS.get(path.suffix.lower(), "text")

@@ -21,12 +21,11 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.network.observations import AFFINE, POINT, PRINCIPAL_DISTANCE, K, P, corrected, corrections
-from photostrip.network.problem import BundleCameras
-from photostrip.network.settings import CALIBRATION
+from photostrip.network.problem import CALIBRATION, BundleCameras
 from photostrip.notes import Document
 from photostrip.result.quantities import MATRIX
-from photostrip.strip.image_coordinates import lens_distortion
-from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
+from photostrip.strip import lens_distortion
+from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
 WHOLE = 1e-6  # of a pixel, up to which rounding may make a photo larger
 TO_CAMERA = np.diag([1.0, -1.0, -1.0])  # from image axes to x to the right, y down, z ahead

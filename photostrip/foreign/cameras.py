@@ -12,7 +12,7 @@ from photostrip.foreign.project import camera_in_pixels, in_project
 from photostrip.notes import Document
 from photostrip.project.resolved import yaml_text
 from photostrip.project.schema.sections import Text
-from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, in_pixels
+from photostrip.strip.pixel_cameras import CONVENTIONS, in_pixels
 
 
 def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | bytes], list[str]]:

@@ -23,7 +23,7 @@ from photostrip.foreign.tables import ForeignBlock
 from photostrip.formats.text.files import BOM, decode, read_bytes
 from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
 from photostrip.notes import counted
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+from photostrip.strip.pixel_cameras import PixelCamera
 
 MODELS = {  # names of the parameters
     "SIMPLE_PINHOLE": "f cx cy",

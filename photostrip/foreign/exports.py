@@ -11,7 +11,7 @@ from photostrip.foreign import cameras, colmap_model, geopackage, historix_submi
 from photostrip.foreign.adjusted import adjusted
 from photostrip.notes import Document
 from photostrip.project.schema.exports import ENDINGS, form_of
-from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
+from photostrip.strip.pixel_cameras import CONVENTIONS
 
 WRITERS = {
     "geopackage": geopackage.write,

@@ -15,8 +15,8 @@ from photostrip.foreign.tables import ForeignBlock
 from photostrip.formats.text.files import refuse
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
 from photostrip.notes import counted, listed
-from photostrip.strip.image_coordinates import lens_distortion
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
+from photostrip.strip import lens_distortion
+from photostrip.strip.pixel_cameras import PixelCamera, in_millimetres
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from photostrip.foreign.places import Place, unique
 from photostrip.foreign.tables import WGS84, ForeignBlock
 from photostrip.formats.text.numbers import SMALLEST_LENGTH, shown
 from photostrip.notes import counted
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+from photostrip.strip.pixel_cameras import PixelCamera
 
 ENDING = ".xml"
 COEFFICIENTS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4", "b1", "b2")

@@ -26,7 +26,7 @@ from photostrip.formats.text.files import decode, refuse
 from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
 from photostrip.formats.text.table_text import unpacked
 from photostrip.notes import counted, listed
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+from photostrip.strip.pixel_cameras import PixelCamera
 
 CAMERAS = {  # focal lengths, principal point, distortion
     "perspective": ("focal focal", "", "k1 k2"),

@@ -18,8 +18,8 @@ from photostrip.notes import counted
 from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
 from photostrip.project.resolved import yaml_text
 from photostrip.project.schema.sections import Text
-from photostrip.strip.image_coordinates.lens_distortion import shift
-from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
+from photostrip.strip.lens_distortion import shift
+from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
 
 PIECE = 100_000  # rows that are written at a time
 HEADER = "# Written by photostrip convert from a {source}, for you to edit; every key: docs/files/project.md.\n"

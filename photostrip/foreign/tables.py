@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
-from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera
+from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera
 
 WGS84 = "EPSG:4979"  # longitude, latitude, ellipsoidal height
 NORTHERNMOST, ROUND = 90.0, 360.0  # degrees of latitude and longitude

@@ -63,7 +63,7 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
     match kind:
         case "model":
             from photostrip.planning.model_plan import both_forms, given_errors, plan_model
-            from photostrip.project.plans.model import load_model_plan
+            from photostrip.project.plans import load_model_plan
             from photostrip.sheets.model_plan import model_sheet
 
             model = load_model_plan(path, assignments)
@@ -72,14 +72,14 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
             forecast, errors = plan_model(spec), given_errors(spec)
             return Plan(model_sheet(model.name, model.camera, forecast, errors, forms, printed=printed), model.files)
         case "strip":
-            from photostrip.project.plans.strip import load_strip_plan
+            from photostrip.project.plans import load_strip_plan
             from photostrip.sheets.strip_plan import strip_sheet
 
             strip = load_strip_plan(path, assignments)
             return Plan(strip_sheet(strip.name, strip.computed()), strip.reading.files)
         case "camera":
             from photostrip.errors import Fault, InputError
-            from photostrip.project.plans.cameras import load_camera_plan
+            from photostrip.project.plans import load_camera_plan
             from photostrip.sheets.plans import camera_sheet
 
             if path is None:
@@ -87,14 +87,14 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
             cameras = load_camera_plan(path, assignments)
             return Plan(camera_sheet(cameras.name, cameras.cameras, cameras.reference, cameras.survey), cameras.files)
         case "displacement":
-            from photostrip.project.plans.displacement import load_displacement_plan
+            from photostrip.project.plans import load_displacement_plan
             from photostrip.sheets.plans import displacement_sheet
 
             survey = load_displacement_plan(path, assignments)
             return Plan(displacement_sheet(survey.name, survey.spec), survey.files)
         case "screening":
             from photostrip.planning.screening import screening_experiment
-            from photostrip.project.plans.screening import load_screening_plan
+            from photostrip.project.plans import load_screening_plan
             from photostrip.sheets.plans import screening_sheet
 
             experiment = load_screening_plan(path, assignments)

@@ -218,17 +218,10 @@ class Result:
         if self.computed is None:
             raise InputError(Fault("a saved result holds no iterations", "result-saved", fix="run the project again"))
         _require_form(form, ("text", "md", "json"))
-        from photostrip.report.commands.trace import trace_sections, trace_title
-        from photostrip.report.page import layout, text
-        from photostrip.result.trace.trace import trace_of
+        from photostrip.report.page.layout import WIDEST_PAGE
+        from photostrip.sheets.trace import trace_sheet
 
-        document = trace_of(self.computed)
-        if form == "json":
-            from photostrip.formats.output.result_json import to_json
-
-            return to_json(document)
-        title, sections = trace_title(document), trace_sections(document)
-        return text.to_markdown(title, sections) if form == "md" else text.to_text(title, sections, layout.WIDEST_PAGE)
+        return trace_sheet(self.computed).rendered(form, WIDEST_PAGE)
 
     def files(self, *, html: bool = False) -> dict[str, str]:
         """Return the files of the result, content by name: tables, the report as a page, result.json as the last."""

@@ -18,13 +18,13 @@ from photostrip.geometry.rotation import angles, from_alpha_omega_kappa
 from photostrip.library.step_arguments import Rays, of_rays, sigma0_of
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip, one_pair
 from photostrip.report.page.parts import DASH, Facts
-from photostrip.result.trace.replay import first_rounds
+from photostrip.sheets.replay import first_rounds
 from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
-from photostrip.strip.image_coordinates.corrections import Bending, undistort
+from photostrip.strip.corrections import Bending, undistort
+from photostrip.strip.intersection import Intersection, lies_across
 from photostrip.strip.polynomial_terms import columns as design_columns
 from photostrip.strip.relative_orientation.solution import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, OrientedPhoto, approximate, project, resect
-from photostrip.strip.strip_formation.intersection import Intersection, lies_across
 from photostrip.units import MICROMETRES
 
 Trace = list[Rows]

@@ -21,12 +21,12 @@ from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.library.step_arguments import rows, same, sigma0_of
 from photostrip.library.steps_of_strips import Absolute, Bundle, Strip, absolute, bundle, polynomial, strip
-from photostrip.strip.image_coordinates.corrections import Bending, refraction_constant, undistort
+from photostrip.strip.corrections import Bending, refraction_constant, undistort
+from photostrip.strip.formed_strip import hand_on_rotations
+from photostrip.strip.intersection import Intersection, intersect
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.strip.resection import OrientedPhoto, space_resection
-from photostrip.strip.strip_formation.intersection import Intersection, intersect
-from photostrip.strip.strip_formation.strip import hand_on_rotations
 
 __all__ = [
     "Absolute",

@@ -18,11 +18,11 @@ from photostrip.network.adjustment import IterationStep, solve
 from photostrip.network.cofactors import cofactors_of
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.points import PhotoPoints
+from photostrip.strip.formed_strip import FirstPhoto, form_from_pairs
 from photostrip.strip.polynomial_terms import POWERS, columns
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.strip.strip_formation.strip import FirstPhoto, form_from_pairs
+from photostrip.strip.scale_transfer import StripFormationSettings
 
 Names = tuple[Sequence[str], Sequence[str]]
 

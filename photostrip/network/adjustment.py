@@ -23,14 +23,8 @@ from scipy.special import chdtri
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.network import datum, defects
-from photostrip.network.normal_equations import (
-    FactoredEquations,
-    NormalEquations,
-    equations_at,
-    factored,
-    linearise,
-)
+from photostrip.network import defects
+from photostrip.network.normal_equations import FactoredEquations, NormalEquations, equations_at, factored, linearise
 from photostrip.network.observations import whitening
 from photostrip.network.problem import BundleProblem, Parameters, PreparedProblem, StartValues, prepare
 from photostrip.strip.robust import falling_weights
@@ -81,7 +75,7 @@ class BundleSolution:
     def factored(self) -> FactoredEquations:
         """The normal equations at the solution in factors; ``bundle-rank`` where they are singular."""
         equations = self.equations or equations_at(self.prepared, self.state)
-        held = datum.anchors if self.rough else datum.anchor
+        held = defects.anchors if self.rough else defects.anchor
         anchor = held(equations.unreduced, self.prepared.rank, self.state) if self.free else None
         found = factored(equations, anchor)
         if found is None:
@@ -141,7 +135,7 @@ def solve(problem: BundleProblem, *, rough: bool = False) -> BundleSolution:
     """
     defects.refuse_repeated(problem)
     prepared = prepare(problem)
-    free = datum.is_free(problem)
+    free = defects.is_free(problem)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # starts far off: such steps are refused
         ended = _iterate(prepared, free=free, rough=rough)
     return _solution(prepared, ended, free=free, rough=rough)
@@ -224,7 +218,7 @@ class _Move(NamedTuple):
 def _move(state: Parameters, equations: NormalEquations, damping: float, *, free: bool) -> _Move:
     """Find the step of all parameters from the normal equations."""
     prepared = equations.prepared
-    anchor = datum.anchor(equations.unreduced, prepared.rank, state) if free else None
+    anchor = defects.anchor(equations.unreduced, prepared.rank, state) if free else None
     added = anchor
     if damping:
         added = np.eye(prepared.problem.unknowns) * (damping * equations.own) + (0.0 if anchor is None else anchor)
@@ -238,10 +232,10 @@ def _move(state: Parameters, equations: NormalEquations, damping: float, *, free
     square = float(right[1] @ right[1] + right[0] @ by_photos + right[2] @ common)
     photos, points = by_photos.reshape(-1, prepared.problem.unknowns), by_points.reshape(-1, 3)
     if free:
-        origin, moves = datum.point_generators(prepared, state)
-        flat = moves.reshape(-1, datum.DEFECT)
+        origin, moves = defects.point_generators(prepared, state)
+        flat = moves.reshape(-1, defects.DEFECT)
         similarity = np.linalg.solve(flat.T @ flat, flat.T @ by_points)
-        photos = photos - datum.photo_generators(state, origin, prepared.problem.unknowns) @ similarity
+        photos = photos - defects.photo_generators(state, origin, prepared.problem.unknowns) @ similarity
         points = points - moves @ similarity
     return _Move(photos=photos, points=points, common=common, length=float(np.sqrt(max(square, 0.0))))
 
@@ -311,7 +305,7 @@ def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
         )
     )
     unknowns = problem.unknowns * problem.photos + 3 * int(prepared.measured.sum()) + len(prepared.prior)
-    return observations - unknowns + (datum.DEFECT if free else 0)
+    return observations - unknowns + (defects.DEFECT if free else 0)
 
 
 FIELDS = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}

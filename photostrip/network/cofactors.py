@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.network import datum
+from photostrip.network import defects
 from photostrip.network.adjustment import BundleSolution, Cofactors
 from photostrip.network.normal_equations import FactoredEquations
 from photostrip.network.observations import LinearisedOrientations, whitening
@@ -143,15 +143,15 @@ def _inner(solution: BundleSolution, points: Floats, of_photos: Floats) -> tuple
     are Q - G P' - P G' + G (H G'E P) G'.
     """
     state, m, p, u = solution.state, len(of_photos), len(solution.common), solution.prepared.problem.unknowns
-    origin, moves = datum.point_generators(solution.prepared, state)
-    flat = moves.reshape(-1, datum.DEFECT)
+    origin, moves = defects.point_generators(solution.prepared, state)
+    flat = moves.reshape(-1, defects.DEFECT)
     inverse = np.asarray(np.linalg.inv(flat.T @ flat), float)
     swept = solution.factored.solved_for_points(flat)
     middle = inverse @ (flat.T @ swept.points) @ inverse
     found = points + _carried_over(moves, (swept.points @ inverse).reshape(moves.shape), middle)
-    turned = np.zeros((m, u + p, datum.DEFECT))
-    turned[:, :u] = datum.photo_generators(state, origin, u)
-    shared = np.broadcast_to(swept.common, (m, p, datum.DEFECT))
+    turned = np.zeros((m, u + p, defects.DEFECT))
+    turned[:, :u] = defects.photo_generators(state, origin, u)
+    shared = np.broadcast_to(swept.common, (m, p, defects.DEFECT))
     own = np.concatenate([swept.photos.reshape(m, u, -1), shared], axis=1) @ inverse
     return found, of_photos + _carried_over(turned, own, middle)
 

@@ -1,4 +1,11 @@
-"""What the observations do not determine, by name: points, the datum, photos, common parameters."""
+"""Where shift, rotation and scale come from: control, positions, or inner constraints on the points.
+
+A free network is solved with seven conditions at two photos, which keep the band, and its steps and cofactors are then
+carried over to inner constraints: of all solutions of the same shape that with the smallest changes of the points,
+and with the smallest trace of their cofactors.
+
+What the observations do not determine, by name: points, the datum, photos, common parameters.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +18,69 @@ from scipy.sparse.csgraph import connected_components
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.network import datum
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.network.normal_equations import NormalEquations, factored, linearise
 from photostrip.network.observations import LinearisedOrientations, attitudes_at, positions_at
 from photostrip.network.problem import BundleProblem, Parameters, PreparedProblem
 from photostrip.notes import counted, named
+
+DEFECT = SIMILARITY_PARAMETERS
+# photos, part: of 250, 500, 1000 and 1e-4, 1e-6, 1e-8 what comes nearest to all photos held by 1e-10, at 10 000 photos
+STRETCH, HELD = 500, 1e-8
+
+
+def is_free(problem: BundleProblem) -> bool:
+    """Whether nothing says where the network is: no control coordinate, no camera position, no attitude."""
+    sigmas = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
+    return not any(np.isfinite(sigma).any() for sigma in sigmas)
+
+
+def anchor(blocks: Floats, rank: Numbers, state: Parameters) -> Floats:
+    """Conditions that hold seven parameters: all of a model; all of a photo, and its distance from the farthest one.
+
+    Returns what is added to the units' blocks (m, u, u); the conditions are made as strong as the rays, whose blocks
+    are ``blocks``; the photo is that in the middle of the order ``rank``.
+    """
+    middle = int(np.argsort(rank)[len(rank) // 2])
+    add = np.zeros_like(blocks)
+    add[middle] = np.diag(np.diag(blocks[middle]))
+    if len(add[middle]) == DEFECT:
+        return add
+    base = state.centers - state.centers[middle]
+    far = int(np.argmax((base**2).sum(axis=1)))
+    direction = state.rotations[far].T @ base[far] / np.linalg.norm(base[far])
+    add[far, :3, :3] += np.trace(blocks[far, :3, :3]) / 3.0 * np.outer(direction, direction)
+    return add
+
+
+def anchors(blocks: Floats, rank: Numbers, state: Parameters) -> Floats:
+    """Conditions of ``anchor``, and a trifle of its own information that holds one unit in ``STRETCH`` where it is.
+
+    Residuals hardly feel it, but thousands of photos that two of them hold alone bend so far that the cofactors of
+    the residuals are lost in rounding.
+    """
+    add = anchor(blocks, rank, state)
+    beside = np.abs(rank - len(rank) // 2)
+    held = (beside % STRETCH == 0) & (beside > 0)
+    add[held] += HELD * blocks[held] * np.eye(blocks.shape[1])
+    return add
+
+
+def photo_generators(state: Parameters, origin: Floats, unknowns: int) -> Floats:
+    """Move photos or models by a small similarity about an origin: (m, u, 7) in their own axes."""
+    back = np.swapaxes(state.rotations, 1, 2)
+    moves = np.zeros((len(back), unknowns, DEFECT))
+    moves[:, :3] = back @ similarity_derivatives(state.centers, origin)
+    moves[:, 3:6, 3:6] = back
+    moves[:, 6:, 6:] = 1.0
+    return moves
+
+
+def point_generators(prepared: PreparedProblem, state: Parameters) -> tuple[Floats, Floats]:
+    """Move points by a small similarity about their mean: the mean, (3,); (q, 3, 7), zero for points without rays."""
+    origin = state.points[prepared.measured].mean(axis=0)
+    return origin, similarity_derivatives(state.points, origin) * prepared.measured[:, None, None]
+
 
 SQUARED_SINE = 1e-10  # square of the sine of the angle between rays
 # standard deviations from which a shift, in sizes of the network, a turn, in radians, or the logarithm of the scale is
@@ -136,7 +200,7 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
     """
     message = f"the bundle adjustment did not converge in {counted(steps, 'step')}"
     control = prepared.problem.control
-    loose = "" if datum.is_free(prepared.problem) else weak(prepared, prepared.begun)
+    loose = "" if is_free(prepared.problem) else weak(prepared, prepared.begun)
     with np.errstate(invalid="ignore"):
         off = np.nan_to_num(np.abs(linearise(prepared, state).control))
     if loose:
@@ -199,17 +263,17 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     rows = np.einsum("nij,njd->nid", control.axes[given], similarity_derivatives(control.xyz[given], origin)) * units
     rows /= control.sigma[given][:, :, None]
     normal = np.einsum("nad,nae->de", rows, rows)
-    of_photos = datum.photo_generators(state, origin, problem.unknowns) * units
+    of_photos = photo_generators(state, origin, problem.unknowns) * units
     for linear in (each for each in (positions, attitudes) if len(each.photo)):  # of photos only
         normal += _information(linear, of_photos, inside, prepared)
-    motions = similarity_derivatives(everything, origin).reshape(-1, datum.DEFECT) * units
+    motions = similarity_derivatives(everything, origin).reshape(-1, DEFECT) * units
     sigmas = np.concatenate([control.sigma[given].ravel(), problem.positions.sigma[at].ravel()])
     sigmas = sigmas[np.isfinite(sigmas)]
     return Held(
         photos=photos,
         normal=normal,
         control=places,
-        motion=motions.T @ motions / len(everything) + UNMOVED * radius**2 * np.eye(datum.DEFECT),
+        motion=motions.T @ motions / len(everything) + UNMOVED * radius**2 * np.eye(DEFECT),
         sigma=np.median(sigmas) if len(sigmas) else np.inf,
     )
 
@@ -219,9 +283,9 @@ def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, p
     rows = inside[linear.photo]
     of_photos = (linear.by_photo[rows] @ moves[linear.photo[rows]]) * linear.weight[rows][:, :, None]
     common = linear.by_common[rows] * linear.weight[rows][:, :, None]
-    whole = np.concatenate([of_photos, common], axis=2).reshape(-1, datum.DEFECT + common.shape[2])
+    whole = np.concatenate([of_photos, common], axis=2).reshape(-1, DEFECT + common.shape[2])
     normal = whole.T @ whole
-    seven = datum.DEFECT
+    seven = DEFECT
     corner = normal[seven:, seven:] + np.diag(prepared.prior**-2.0)
     return np.asarray(normal[:seven, :seven] - normal[:seven, seven:] @ np.linalg.pinv(corner) @ normal[seven:, :seven])
 

@@ -26,8 +26,13 @@ from photostrip.network.adjustment import BundleSolution, Cofactors
 from photostrip.network.normal_equations import Columns, Explained
 from photostrip.network.observations import AFFINE, PRINCIPAL_DISTANCE, K, P, by_calibration, values_of
 from photostrip.network.observations import POINT as PRINCIPAL_POINT
-from photostrip.network.problem import BundleProblem, ControlObservations, PositionObservations, StartValues
-from photostrip.network.settings import CALIBRATION
+from photostrip.network.problem import (
+    CALIBRATION,
+    BundleProblem,
+    ControlObservations,
+    PositionObservations,
+    StartValues,
+)
 
 ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
 LENS, EDGE, DECENTRED = "lens distortion", "lens distortion at the edge", "decentred lens"

@@ -25,6 +25,7 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Distortion
 from photostrip.geometry.rotation import cross_matrix, to_vector
 from photostrip.network.problem import (
+    CALIBRATION,
     AttitudeObservations,
     BundleCameras,
     BundleProblem,
@@ -33,8 +34,7 @@ from photostrip.network.problem import (
     Parameters,
     PositionObservations,
 )
-from photostrip.network.settings import CALIBRATION
-from photostrip.strip.image_coordinates import lens_distortion
+from photostrip.strip import lens_distortion
 
 PRINCIPAL_DISTANCE = list(CALIBRATION).index("c")
 STEPS_TO_IMAGE = 2  # a misfit is small, and each step leaves the square of what was left

@@ -9,17 +9,16 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.network.adjustment import Selection
-from photostrip.network.problem import BundleCameras, BundleProblem, ImageObservations, StartValues
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleCameras, BundleProblem, BundleSettings, ImageObservations, StartValues
 from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
-from photostrip.strip.gross_errors.pair_search import ALPHA, FIFTH_WRONG
+from photostrip.strip.formed_strip import FormedStrip, mean_points
+from photostrip.strip.pair_search import ALPHA, FIFTH_WRONG
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.strip.relative_orientation.standard_points import MINIMUM_LEFT
 from photostrip.strip.robust import MEDIAN_SPREAD, scales
-from photostrip.strip.strip_formation.strip import FormedStrip, mean_points
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,11 +29,10 @@ from photostrip.network.adjustment import BundleSolution, Selection
 from photostrip.network.cofactors import JointCofactors
 from photostrip.network.observations import in_models
 from photostrip.network.problem import BundleProblem, ModelObservations
-from photostrip.network.reliability import IMAGE, Limit
-from photostrip.network.self_calibration import image_shift
+from photostrip.network.reliability import IMAGE, Limit, image_shift
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY, Rejection
 from photostrip.statistics import chi2_quantile
-from photostrip.strip.gross_errors.pair_search import LARGEST_SET, LIKELIER, subsets
+from photostrip.strip.pair_search import LARGEST_SET, LIKELIER, subsets
 from photostrip.strip.ray_intersection import two_that_meet
 from photostrip.strip.resection import KnownPhotos, derivatives, project
 

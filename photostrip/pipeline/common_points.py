@@ -18,8 +18,8 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline import precision
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
+from photostrip.pipeline.strips.absolute import ScreenedPhotos
 from photostrip.pipeline.strips.notes import precision_of_long_strip
-from photostrip.pipeline.strips.photos_on_control import ScreenedPhotos
 from photostrip.plausibility.ids import TiesOfStrips
 from photostrip.points import ControlPoints, PhotoPoints
 

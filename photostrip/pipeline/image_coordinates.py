@@ -15,10 +15,10 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import corrections
+from photostrip.strip import corrections
 
 if TYPE_CHECKING:
-    from photostrip.strip.image_coordinates.interior import InteriorOrientation
+    from photostrip.strip.interior import InteriorOrientation
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
     """Interior orientation, when fiducial marks were measured."""
     if inputs.fiducials is None:
         return PhotoCoordinates(inputs.observations, None)
-    from photostrip.strip.image_coordinates import interior  # digital cameras need none of it
+    from photostrip.strip import interior
 
     orientation = interior.orient(inputs.fiducials, inputs.cameras, settings.interior)
     return PhotoCoordinates(interior.transform(inputs.observations, orientation), orientation)

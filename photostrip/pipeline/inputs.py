@@ -15,16 +15,16 @@ from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleSettings
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 from photostrip.strip.absolute_orientation import AbsoluteSettings
-from photostrip.strip.image_coordinates.corrections import ImageCorrectionSettings, InteriorSettings
-from photostrip.strip.independent_models.linking import LinkSettings
+from photostrip.strip.corrections import ImageCorrectionSettings, InteriorSettings
+from photostrip.strip.formed_strip import NOTHING_GIVEN, FirstPhoto
+from photostrip.strip.model_links import LinkSettings
 from photostrip.strip.polynomial import PolynomialSettings
 from photostrip.strip.relative_orientation.orientation import RelativeSettings
 from photostrip.strip.resection import KnownPhotos
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.strip.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
+from photostrip.strip.scale_transfer import StripFormationSettings
 
 METHODS = SIMILARITY, POLYNOMIAL, BUNDLE = "similarity", "polynomial", "bundle"
 AUTO = "auto"  # bundle where it is determined, otherwise polynomial

@@ -12,12 +12,12 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
 from photostrip.points import ModelPoints, PhotoPoints
-from photostrip.strip.independent_models.linking import LinkSettings
+from photostrip.strip.model_links import LinkSettings
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_again
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
-    from photostrip.strip.gross_errors.pair_screening import ScreenedPairs
+    from photostrip.strip.pair_screening import ScreenedPairs
 
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 

@@ -21,7 +21,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.results import Adjusted, Precision, StripResult
-from photostrip.pipeline.strips.photos_on_control import OrientedPhotos
+from photostrip.pipeline.strips.absolute import OrientedPhotos
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip import absolute_orientation, fitted_strip
 from photostrip.strip.fitted_strip import (

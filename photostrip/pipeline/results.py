@@ -16,26 +16,25 @@ from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip import absolute_orientation as absolute
+from photostrip.strip.formed_strip import FormedStrip
 from photostrip.strip.polynomial import Polynomial
 from photostrip.strip.relative_orientation.orientation import Orientation
-from photostrip.strip.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.network import reliability, self_calibration
+    from photostrip.network import reliability
     from photostrip.network.adjustment import Selection
     from photostrip.network.cofactors import Correlation
     from photostrip.network.problem import BundleProblem
     from photostrip.network.snooping import ScreenedBundle
     from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights
+    from photostrip.strip import corrections, pair_screening
     from photostrip.strip import resection as exterior
+    from photostrip.strip.control_screening import ScreenedControl
     from photostrip.strip.fitted_strip import CheckErrors
-    from photostrip.strip.gross_errors import pair_screening
-    from photostrip.strip.gross_errors.control_screening import ScreenedControl
-    from photostrip.strip.image_coordinates import corrections
-    from photostrip.strip.image_coordinates.interior import InteriorOrientation
-    from photostrip.strip.independent_models.formation import FormedModels
+    from photostrip.strip.interior import InteriorOrientation
+    from photostrip.strip.model_strip import FormedModels
 
 ROLES = NEW, CONTROL, CHECK = "new", "control", "check"
 
@@ -244,7 +243,7 @@ class Bundle:
     groups: tuple[reliability.Group, ...]  # observations that took part with their redundancy numbers
     sigma0: reliability.Sigma0Test  # test of sigma0, with the stated standard deviations
     components: tuple[reliability.Component, ...]  # variance components; empty when none were asked for
-    parameters: tuple[self_calibration.Parameter, ...]
+    parameters: tuple[reliability.Parameter, ...]
     # correlations above 0.95: of parameters that photos share with each other and with the photo where it is largest,
     # and the largest within photos
     correlations: tuple[Correlation, ...]

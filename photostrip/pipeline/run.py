@@ -20,9 +20,9 @@ from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, ori
 from photostrip.pipeline.inputs import AUTO, BUNDLE, POLYNOMIAL, Inputs, Settings, require_runnable, require_whole
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.results import AdjustedStrips, Result
+from photostrip.pipeline.strips.absolute import on_control
 from photostrip.pipeline.strips.method import adjust_formed, adjust_photos, as_single_photos, form_strips
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.pipeline.strips.photos_on_control import on_control
 from photostrip.points import PhotoPoints
 
 

@@ -29,12 +29,12 @@ from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
 from photostrip.strip import absolute_orientation, fitted_strip, polynomial, polynomial_terms
 from photostrip.strip.fitted_strip import FittedStrip
-from photostrip.strip.gross_errors.pair_screening import DETECTABLE
+from photostrip.strip.formed_strip import FormedStrip, form_from_pairs
+from photostrip.strip.pair_screening import DETECTABLE
 from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.scale_transfer import StripFormationSettings
 from photostrip.strip.strip_errors import StripErrors, differentiate_strip
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.strip.strip_formation.strip import FormedStrip, form_from_pairs
 
 SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
 LEAST_PHOTOS = 3

@@ -16,7 +16,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.rotation import from_angles
-from photostrip.strip.gross_errors.pair_screening import ScreenedPairs, screen_pairs
+from photostrip.strip.pair_screening import ScreenedPairs, screen_pairs
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.strip.relative_orientation.solution import linearised_parallaxes

@@ -19,10 +19,10 @@ from photostrip.arrays import Floats
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.local_frame import EARTH_RADIUS
 from photostrip.statistics import f_p_value
-from photostrip.strip.gross_errors.control_search import HEIGHT, JointAdjustment, adjust
+from photostrip.strip.control_search import HEIGHT, JointAdjustment, adjust
 
 if TYPE_CHECKING:
-    from photostrip.strip.gross_errors.control_search import StripAtControl
+    from photostrip.strip.control_search import StripAtControl
 
 
 MORE_THAN_ALONE = 1.0 + 1e-6  # of what one point explains: a list may have one point only

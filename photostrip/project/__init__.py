@@ -10,6 +10,7 @@ metres, east, north, up. All faults of all files are reported at once, each with
   axes and rotations into those of the program, ``hints`` says what is not used, ``resolved`` writes the project with
   nothing left open, ``places`` finds where a finding would be put right; ``in_memory`` takes projects without files;
 - ``check``: what can be said before anything is adjusted;
-- ``plans/``, ``terrestrial/``, ``steps``, ``tolerances``, ``simulation``: the other kinds of files;
+- ``plans``, ``steps``, ``tolerances``, ``simulation``: the other kinds of files; ``directions``, ``survey``,
+  ``phototheodolites`` and ``terrestrial_tables`` those of terrestrial computations;
 - ``template``: the first files of a new project; ``editors``: JSON Schemas of all files.
 """

@@ -7,25 +7,23 @@ coordinate gets and from where, and what became of every row of every table.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.control import ControlTable
-from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.models import ModelTable
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Table
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.notes import Document, Finding, Note, counted
+from photostrip.notes import Document, Finding, Note, counted, listed
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, Strip, require_whole
@@ -34,19 +32,11 @@ from photostrip.points import PhotoPoints, locate
 from photostrip.project.loading import Project, read_project
 from photostrip.project.tables import Tables, rays
 from photostrip.project.yaml.tree import fault_at, key_path
-from photostrip.strip.image_coordinates import corrections
+from photostrip.strip import corrections
 from photostrip.units import MICROMETRES, MILLIMETRES
 
 LEAST_SHARED = 4  # points that orient a photo
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
-IN_NO_STRIP = "its photo belongs to no strip"
-ONCE = "the point is measured on one photo only"
-NO_NEIGHBOUR = "the point is not on two neighbouring photos of one strip"
-IN_NO_MODEL = "its model belongs to no strip"
-NO_MODEL = "not measured in any model of the strips"
-OFF = "switched off (use: off)"
-NO_BUNDLE = "only the bundle adjustment uses it"
-NOT_MEASURED = "not measured on any photo of the strips"
 
 
 @dataclass(frozen=True)
@@ -100,20 +90,25 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     else:
         measured = (tables.observations,)
         sigma = {"image_sigma": sigma_of(project, "observations", measured, inputs.observations.sigma)}
+    gaps = gaps_of(inputs, used) if models is None else []
+    if gaps and not project.settings.together:
+        number = counted(len(gaps), "point is", "points are")
+        message = f"{number} not on two neighbouring photos of one strip and cannot be used: {listed(gaps)}"
+        notes.append(Note("no-neighbour", message, "note", points=tuple(gaps)))
     document: Document = {
         "name": inputs.name,
         "angle_unit": project.settings.angle_unit,
-        "counts": _counts(project, used),
+        "counts": _counts(project) | {"without_neighbour": len(gaps)},
         **sigma,
         "frames": frames,
         "control": list(_control(project, tables)),
-        "rows": table_rows(project, tables, used),
+        "rows": table_rows(project, tables, gaps),
     }
-    counted = Findings()  # of too many faults in one file they only count the rest
-    counted.add(*dict.fromkeys(faults))
+    kept = Findings()  # of too many faults in one file they only count the rest
+    kept.add(*dict.fromkeys(faults))
     return Checked(
         path=str(path),
-        faults=counted.faults,
+        faults=kept.faults,
         findings=_against_themselves(project),
         notes=tuple(notes),
         document=document,
@@ -232,7 +227,7 @@ def _control_of_strips(project: Project, used: Numbers) -> Iterator[Fault]:
         yield fault_at(project.tree, path, message, "too-little-control", expected=expected, fix=fix)
 
 
-def _counts(project: Project, used: Numbers) -> Document:
+def _counts(project: Project) -> Document:
     inputs, measured = project.inputs, project.inputs.observations.point_ids
     given, shown = inputs.control, locate(inputs.control.ids, measured) >= 0
     return {
@@ -248,7 +243,6 @@ def _counts(project: Project, used: Numbers) -> Document:
         "control_height": int((given.use[:, 2] & ~given.check & shown).sum()),
         "check_plan": int((given.use[:, 0] & given.check & shown).sum()),
         "check_height": int((given.use[:, 2] & given.check & shown).sum()),
-        "without_neighbour": len(gaps_of(inputs, used)) if inputs.models is None else 0,
     }
 
 
@@ -423,15 +417,6 @@ def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:
     return found
 
 
-class Reason(NamedTuple):
-    """Why rows are not used, which of them, and whose they are."""
-
-    why: str
-    rows: Flags
-    ids: Sequence[str]
-    of_rows: Numbers  # which of the ids each row has
-
-
 def observations_used(inputs: Inputs) -> Numbers:
     """Return the strip in which each image point takes part, shape (n,); -1 where no neighbouring photo shows it."""
     observations = inputs.observations
@@ -467,116 +452,43 @@ def gaps_of(inputs: Inputs, used: Numbers) -> list[str]:
     return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
 
 
-def table_rows(project: Project, tables: Tables, used: Numbers) -> list[Document]:
-    """Count what became of the rows of each table; used and unused rows add up to all rows.
+def table_rows(project: Project, tables: Tables, gaps: Sequence[str]) -> list[Document]:
+    """Count the rows of each file, and those that are used; why others are not, notes say.
 
-    The keys are ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line.
+    gaps: points that no two neighbouring photos of a strip show, which are of use to a bundle alone.
     """
-    inputs = project.inputs
-    photos = {photo for strip in inputs.strips for photo in strip.photos}
+    inputs, bundle = project.inputs, project.settings.together
+    # which rows are used, and of how many rows of its file each is made
+    parts: list[tuple[Table, Flags, Numbers | None]] = []
     if tables.models is not None and inputs.models is not None:
-        return model_rows(tables, inputs.models)
-    found = []
-    bundle = project.settings.together
-    apart = set() if bundle else set(gaps_of(inputs, used))  # a bundle takes points of any two photos
-    control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
-    count: dict[str, int] = {}
-    if tables.observations is not None:
-        count = rays(tables.observations, photos)
-        found += _measured(tables.observations, photos, count, apart, control if bundle else set())
-    if (marks := tables.fiducials) is not None:
-        reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
-        found += _blocks(marks.table, reasons, marks.times)
-    if bundle:  # and control of a single one
-        count = {name: max(number, 2) for name, number in count.items()}
-    found += [_given(read, count, apart) for read in tables.control if read is not None]
-    found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
-    return found
-
-
-def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
-    """Count what became of the rows of each table of a project of independent models, as ``table_rows``."""
-    found = []
-    known = set(models.points.model_ids)
-    read = tables.models
-    for each in () if read is None else (read.points, read.centers):
-        if each is not None:
-            reasons = [_outside(IN_NO_MODEL, each.model_ids, known, each.models)]
-            found.append(_block(each.table, reasons))
-    points = set(models.points.point_ids)
-    for control in tables.control:
-        if control is not None:
-            missing = _outside(NO_MODEL, control.ids, points)
-            off = missing._replace(why=OFF, rows=~control.used)
-            reasons = [off, missing._replace(rows=control.used & missing.rows)]
-            found.append(_block(control.table, reasons))
-    return found
-
-
-def _outside(why: str, ids: Sequence[str], known: set[str], of_rows: Numbers | None = None) -> Reason:
-    """Rows whose id is not known; without `of_rows` each row has an id of its own."""
-    of_rows = np.arange(len(ids)) if of_rows is None else of_rows
-    rows = np.array([name not in known for name in ids], bool)[of_rows]
-    return Reason(why=why, rows=rows, ids=ids, of_rows=of_rows)
-
-
-def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
-    outside = _outside(IN_NO_STRIP, read.ids, photos)
-    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(read.ids), bool)
-    reasons = [
-        outside,
-        outside._replace(why=OFF, rows=~outside.rows & off),
-        outside._replace(why=NO_BUNDLE, rows=~outside.rows & ~off & (not bundle)),
+        shown, known = set(inputs.models.points.point_ids), set(inputs.models.points.model_ids)
+        measured = (each for each in (tables.models.points, tables.models.centers) if each is not None)
+        parts += [(each.table, _among(each.model_ids, known)[each.models], None) for each in measured]
+    else:
+        photos = {photo for strip in inputs.strips for photo in strip.photos}
+        whole = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if bundle and use.all()}
+        count = {} if tables.observations is None else rays(tables.observations, photos)
+        apart = set() if bundle else set(gaps)
+        joining = {name for name, number in count.items() if number > 1 and name not in apart}
+        shown = set(count) if bundle else joining
+        if (read := tables.observations) is not None:
+            kept = _among(read.photo_ids, photos)[read.photo] & _among(read.target_ids, joining | whole)[read.target]
+            parts.append((read.table, kept, read.times))
+        if (marks := tables.fiducials) is not None:
+            parts.append((marks.table, _among(marks.photo_ids, photos)[marks.photo], marks.times))
+        if (positions := tables.positions) is not None:
+            parts.append((positions.table, _among(positions.ids, photos) & positions.used & bundle, None))
+        if (orientations := tables.orientations) is not None:
+            parts.append((orientations.table, _among(orientations.ids, photos) & bundle, None))
+    control = (each for each in tables.control if each is not None)
+    parts += [(each.table, each.used & _among(each.ids, shown), None) for each in control]
+    return [
+        {"file": file, "rows": int(number[inside].sum()), "used": int(number[inside & kept].sum())}
+        for table, kept, times in parts
+        for number in [np.ones(len(table), np.intp) if times is None else times]
+        for file, inside in table.files
     ]
-    return _block(read.table, reasons)
 
 
-def _measured(
-    read: Measurements, photos: set[str], count: dict[str, int], gaps: set[str], whole: set[str]
-) -> list[Document]:
-    """Sort the rows of measured points by what becomes of them."""
-    outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
-    once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
-    apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
-    ids: Document = {"ids": read.target_ids, "of_rows": read.target}
-    reasons = [
-        outside,
-        Reason(why=ONCE, rows=~outside.rows & once, **ids),
-        Reason(why=NO_NEIGHBOUR, rows=~outside.rows & ~once & apart, **ids),
-    ]
-    return _blocks(read.table, reasons, read.times)
-
-
-def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
-    number = np.array([count.get(name, 0) for name in read.ids], np.intp)
-    apart = np.array([name in gaps for name in read.ids], bool)
-    ids: Document = {"ids": read.ids, "of_rows": np.arange(len(read.ids))}
-    reasons = [
-        Reason(why=OFF, rows=~read.used, **ids),
-        Reason(why=NOT_MEASURED, rows=read.used & (number == 0), **ids),
-        Reason(why=ONCE, rows=read.used & (number == 1), **ids),
-        Reason(why=NO_NEIGHBOUR, rows=read.used & (number > 1) & apart, **ids),
-    ]
-    return _block(read.table, reasons)
-
-
-def _blocks(table: Table, reasons: list[Reason], times: Numbers) -> list[Document]:
-    """Count the rows of each file of a table; `times` says of how many rows of the file each of them is made."""
-    found = []
-    for file, inside in table.files:
-        of_file = [each._replace(rows=each.rows & inside) for each in reasons]
-        found.append(_block(table, of_file, np.where(inside, times, 0)) | {"file": file})
-    return found
-
-
-def _block(table: Table, reasons: list[Reason], times: Numbers | None = None) -> Document:
-    times = np.ones(len(table.lines), np.intp) if times is None else times
-    unused: list[Document] = []
-    for reason in reasons:
-        at = np.flatnonzero(reason.rows)
-        if len(at):
-            ids = list(dict.fromkeys(reason.ids[code] for code in reason.of_rows[at].tolist()))
-            line = int(table.lines[at[0]])
-            unused.append({"why": reason.why, "rows": int(times[at].sum()), "ids": ids, "first_line": line})
-    rows = int(times.sum())
-    return {"file": table.file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}
+def _among(ids: Sequence[str], known: Container[str]) -> Flags:
+    return np.array([name in known for name in ids], bool)

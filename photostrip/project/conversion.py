@@ -31,10 +31,9 @@ from photostrip.project.schema.ground import Control, Ellipsoid, GivenAngles, Gi
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.schema.sections import Section
 from photostrip.project.yaml.tree import Node
-from photostrip.strip.image_coordinates import fiducial_marks
-from photostrip.strip.image_coordinates.fiducial_marks import Certificate
-from photostrip.strip.strip_formation import strip
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip import fiducial_marks, formed_strip
+from photostrip.strip.fiducial_marks import Certificate
+from photostrip.strip.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -158,12 +157,12 @@ def _by_number(name: str) -> tuple[list[tuple[str, int]], str]:
     return [(text, int(digits or -1)) for text, digits in _NUMBERED.findall(name)], name
 
 
-def _first_photo(given: FirstPhoto | None) -> strip.FirstPhoto:
+def _first_photo(given: FirstPhoto | None) -> formed_strip.FirstPhoto:
     """Return the frame and the scale of a strip."""
     if given is None:
-        return strip.NOTHING_GIVEN
+        return formed_strip.NOTHING_GIVEN
     rotation = from_angles(np.array(given.angles) * RADIANS[given.unit], given.system)
-    return strip.FirstPhoto(rotation, given.base)
+    return formed_strip.FirstPhoto(rotation, given.base)
 
 
 def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, camera.Camera]) -> PhotoPoints:

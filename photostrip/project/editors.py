@@ -17,14 +17,14 @@ KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
     "tolerances": ("tolerances", "ToleranceFile", "photostrip tolerance profile"),
-    "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
-    "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
-    "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),
-    "displacement": ("plans.displacement", "DisplacementPlanFile", "photostrip plan displacement"),
-    "screening": ("plans.screening", "ScreeningPlanFile", "photostrip plan screening"),
-    "terrestrial displacement": ("terrestrial.survey_file", "TerrestrialFile", "photostrip terrestrial displacement"),
+    "model": ("plans", "ModelPlanFile", "photostrip plan model"),
+    "strip": ("plans", "StripPlanFile", "photostrip plan strip"),
+    "camera": ("plans", "CameraPlanFile", "photostrip plan camera"),
+    "displacement": ("plans", "DisplacementPlanFile", "photostrip plan displacement"),
+    "screening": ("plans", "ScreeningPlanFile", "photostrip plan screening"),
+    "terrestrial displacement": ("survey", "TerrestrialFile", "photostrip terrestrial displacement"),
     **{
-        f"terrestrial {kind}": ("terrestrial.directions", name, f"photostrip terrestrial {kind}")
+        f"terrestrial {kind}": ("directions", name, f"photostrip terrestrial {kind}")
         for kind, name in {
             "directions": "DirectionsFile",
             "photo": "PhotoFile",

@@ -26,7 +26,7 @@ from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.schema.sections import Section
 from photostrip.project.tables import Tables, alike, rays
 from photostrip.project.yaml.tree import NO_FILES, Node, key_path
-from photostrip.strip.image_coordinates.fiducial_marks import POOR_FIT, Certificate
+from photostrip.strip.fiducial_marks import POOR_FIT, Certificate
 
 NEAR_NAMED = 3
 

@@ -146,8 +146,8 @@ def read_project(path: Path, overrides: Sequence[str] = ()) -> tuple[Project, Ta
     placed_models = {} if tables.models is None else check_models(root, tables.models, findings)
     source = current()
     grid_folder = source.grids if source is not None and source.grids is not None else path.parent
-    findings.add(*_check_certificates(root, checked))
-    tied = _tied_frames(root, checked, grid_folder, findings)
+    findings.add(*_check_certificates(root))
+    tied = _tied_frames(root, grid_folder, findings)
     try:
         project = completed(reading.complete(checked), root, reading.file, measured_photos(tables))
         inputs, notes = _inputs(project, tables, root, placed_models, {} if tied is None else tied.frames)
@@ -182,13 +182,10 @@ def _seen_from(file: str, folder: Path) -> str:
         return file
 
 
-def _check_certificates(root: Node, checked: ProjectFile | None) -> Iterator[Fault]:
-    """Solve the distances between fiducial marks once, to find out whether that can be done.
-
-    checked: the project where the schema finds no fault in it; otherwise each section is read for itself.
-    """
+def _check_certificates(root: Node) -> Iterator[Fault]:
+    """Solve the distances between fiducial marks once, to find out whether that can be done."""
     for name, node in root.mapping_at("cameras").items():
-        given = valid_section(CameraBlock, node) if checked is None else checked.cameras[name]
+        given = valid_section(CameraBlock, node)
         if given is None:
             continue  # the schema says what is wrong with it
         try:
@@ -197,9 +194,9 @@ def _check_certificates(root: Node, checked: ProjectFile | None) -> Iterator[Fau
             yield from (at_own_key(fault, root, "cameras", name) for fault in error.faults)
 
 
-def _tied_frames(root: Node, checked: ProjectFile | None, directory: Path, findings: Findings) -> TiedFrames | None:
+def _tied_frames(root: Node, directory: Path, findings: Findings) -> TiedFrames | None:
     """Tie the ground frames together; what forbids it is a fault of the project."""
-    given, output = _read_alone(root) if checked is None else _read(checked)
+    given, output = _frames_given(root)
     specs = {name: conversion.frame_spec(each) for name, each in given.items() if each is not None}
     if not specs or len(specs) != len(given) or output is None:
         return None  # the schema says what is wrong with them
@@ -212,21 +209,13 @@ def _tied_frames(root: Node, checked: ProjectFile | None, directory: Path, findi
     return TiedFrames(dict(zip(specs.values(), tied, strict=True)), result)
 
 
-def _read(project: ProjectFile) -> tuple[dict[str, GivenList | None], Output]:
-    """Give the lists of given coordinates by their keys, and the frame of the results."""
-    lists: dict[str, GivenList | None] = {f"control[{i}]": each for i, each in enumerate(project.control)}
-    others = {"camera_positions": project.camera_positions, "orientations": project.orientations}
-    lists |= {name: each for name, each in others.items() if each is not None}
-    return _without_own_frame(lists), project.output
-
-
-def _read_alone(root: Node) -> tuple[dict[str, GivenList | None], Output | None]:
-    """Give the same where other parts of the project are at fault; None for those that are."""
+def _frames_given(root: Node) -> tuple[dict[str, GivenList | None], Output | None]:
+    """Give the lists of given coordinates by their keys, and the frame of the results; None for what is at fault."""
     blocks: list[tuple[str, type[GivenList], Node | None]] = [
-        (f"control[{i}]", Control, each) for i, each in enumerate(root.list_at("control"))
+        *((f"control[{i}]", Control, each) for i, each in enumerate(root.list_at("control"))),
+        ("camera_positions", CameraPositionsBlock, root.find("camera_positions")),
+        ("orientations", Orientations, root.find("orientations")),
     ]
-    blocks += [("camera_positions", CameraPositionsBlock, root.find("camera_positions"))]
-    blocks += [("orientations", Orientations, root.find("orientations"))]
     given = {name: valid_section(kind, node) for name, kind, node in blocks if node is not None}
     return _without_own_frame(given), valid_section(Output, root.find("output"))
 
@@ -240,7 +229,7 @@ def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenLis
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
     """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
-    from photostrip.pipeline.plausibility import image_evidence
+    from photostrip.pipeline.plausibility import evidence
 
     root, measured = reading.root, tables.observations
     given = valid_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)})
@@ -251,7 +240,7 @@ def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
         inputs, _ = _inputs(completed(given, root, reading.file, measured_photos(read)), read, root, {}, {})
         if not np.isfinite(inputs.observations.xy).all():
             return ()  # the size of a pixel, or the format, is what is missing
-        findings = image_evidence.of_units(inputs, conversion.settings(given))
+        findings = evidence.of_units(inputs, conversion.settings(given))
     except (GeometryError, InputError):
         return ()
     return tuple(places_of(findings, root, listed_points(tables), inputs.flights))

@@ -38,7 +38,6 @@ from photostrip.project.schema.sections import (
 )
 from photostrip.project.yaml.reading import Reading, read_file
 
-SCHEMA_NUMBER = 1
 USUAL = simulation.Spec()
 USUAL_MODELS = simulation.Models()
 USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulation.Film(), simulation.Gnss(), simulation.GrossError("image")
@@ -194,12 +193,13 @@ class Models(Section):
     centers: Flag = key("Measure the perspective centres", USUAL_MODELS.centers)
 
 
+SchemaNumber = Annotated[int, schema_number("photostrip_simulation", " of simulations")]
+
+
 class SimulationFile(Section):
     """A specification: strips of photos to be simulated. Every key has a default."""
 
-    photostrip_simulation: Annotated[
-        Whole, After(schema_number("photostrip_simulation", SCHEMA_NUMBER, " of simulations"))
-    ] = key("Number of this schema")
+    photostrip_simulation: SchemaNumber = key("Number of this schema")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the project", USUAL.name)
     seed: Whole = key("Number that all random numbers come from", USUAL.seed)

@@ -8,71 +8,61 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
-from photostrip.formats.text.numbers import NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
-from photostrip.project.schema.sections import Flag, Read, Section, Words, key, schema_number, wrong
+from photostrip.formats.text.numbers import LARGEST_NUMBER
+from photostrip.project.schema.sections import (
+    After,
+    Flag,
+    NotNegative,
+    Range,
+    Section,
+    Whole,
+    Words,
+    bounded,
+    key,
+    schema_number,
+)
 from photostrip.project.yaml.reading import read_file
 
-SCHEMA_NUMBER = 1
 USUAL = Tolerances()
 T = TypeVar("T", bound=Section)
 
 
-def _size(value: object) -> float:
-    """Read a size: a number that is not negative."""
-    expected = "a number, 0 or larger"
-    try:
-        found = read_number(value) if isinstance(value, str) else -1.0
-    except NotANumber as why:
-        raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
-    if found < 0:
-        raise wrong(f"{shown(str(value))} is out of range", code="range", expected=expected)
-    return found
-
-
-def _whole(value: object) -> int:
-    found = _size(value)
-    if found != int(found):
-        raise wrong(f"{shown(str(value))} is not a whole number", code="number", expected="a whole number")
-    return int(found)
-
-
-Size = Annotated[float, Read(_size, {"type": "number", "minimum": 0})]
-Whole = Annotated[int, Read(_whole, {"type": "integer", "minimum": 0})]
-_read_schema_number = schema_number("photostrip_tolerances", SCHEMA_NUMBER, " of tolerances")
-SchemaNumber = Annotated[int, Read(_read_schema_number, {"const": SCHEMA_NUMBER})]
+Count = Annotated[Whole, After(bounded(Range(0, LARGEST_NUMBER, "")))]
 
 
 class Absolute(Section):
     """Tolerance of what has a size of its own."""
 
-    absolute: Size | None = key("Difference allowed, in the unit of the kind", None)
+    absolute: NotNegative | None = key("Difference allowed, in the unit of the kind", None)
     ignore: Flag = key("Do not compare this kind", default=False)
 
 
 class Both(Absolute):
     """Tolerance that may grow with the quantity; the larger part counts."""
 
-    relative: Size | None = key("Difference allowed, as a share of the baseline", None)
+    relative: NotNegative | None = key("Difference allowed, as a share of the baseline", None)
 
 
 class Statistics(Both):
     """Tolerance of statistics, which come in metres and in micrometres."""
 
-    absolute_um: Size | None = key("Difference allowed of statistics in micrometres", None)
+    absolute_um: NotNegative | None = key("Difference allowed of statistics in micrometres", None)
 
 
 class Members(Section):
     """Tolerance of a set."""
 
-    missing: Whole | None = key("Members that may be missing", None)
-    new: Whole | None = key("Members that may be new", None)
+    missing: Count | None = key("Members that may be missing", None)
+    new: Count | None = key("Members that may be new", None)
     ignore: Flag = key("Do not compare this set", default=False)
 
 
 def _usual(kind: type[T], usual: Tolerance | SetTolerance) -> T:
     """Return a section that holds the defaults."""
     return kind.model_construct(**{name: getattr(usual, name) for name in kind.model_fields})
+
+
+SchemaNumber = Annotated[int, schema_number("photostrip_tolerances", " of tolerances")]
 
 
 class ToleranceFile(Section):

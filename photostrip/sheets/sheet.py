@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.notes import Document
+from photostrip.report.page.layout import USUAL
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
 
@@ -59,7 +60,7 @@ def plain(value: Any, form: str = "") -> Any:  # noqa: ANN401 (the same)
         return None if isinstance(number, float) and not isfinite(number) else number
     spec = form.rpartition(" ")[2]
     found = (
-        float(f"{number:.{int(spec[1:]) + MORE_DIGITS}g}")
+        float(f"{number:.{int(spec[1:]) + MORE_DIGITS}{spec[0]}}")
         if spec[0] in "eg"
         else round(number, int(spec) + MORE_DECIMALS)
     )
@@ -231,8 +232,8 @@ class Sheet:
         names = [each.key for each in parts[0].fields if each.key]
         return to_csv(names, (row.values() for each in parts for row in each.plain()))
 
-    def rendered(self, form: str) -> str:
-        """Return the sheet as a file holds it: ``text``, ``md``, ``html``, ``json`` or ``csv``."""
+    def rendered(self, form: str, width: int = USUAL) -> str:
+        """Return the sheet as a file holds it: ``text`` so wide, ``md``, ``html``, ``json`` or ``csv``."""
         from photostrip.formats.output.result_json import to_json
 
         if form == "json":
@@ -244,7 +245,9 @@ class Sheet:
             from photostrip.report.html import sections_html
 
             return sections_html(self.title, __version__, self.sections())
-        return (to_markdown if form == "md" else to_text)(self.title, self.sections())
+        if form == "md":
+            return to_markdown(self.title, self.sections())
+        return to_text(self.title, self.sections(), width)
 
 
 def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:

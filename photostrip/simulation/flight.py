@@ -23,8 +23,8 @@ from photostrip.geodesy.local_frame import geocentric_from_geodetic, local_axes_
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.spec import Spec
-from photostrip.strip.image_coordinates import lens_distortion
-from photostrip.strip.image_coordinates.corrections import refraction_constant
+from photostrip.strip import lens_distortion
+from photostrip.strip.corrections import refraction_constant
 
 WAVES = 5  # sine waves that make up the relief
 

@@ -28,7 +28,7 @@ from photostrip.simulation.measuring import (
 )
 from photostrip.simulation.placement import Placed, Roles, given_coordinates, place, roles, shown
 from photostrip.simulation.spec import LARGEST_ARC, Spec, faults_of
-from photostrip.strip.image_coordinates.corrections import distort
+from photostrip.strip.corrections import distort
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
 MOST_ROUND_TRIP = 1e-4  # metres

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from photostrip.camera import Camera
 from photostrip.errors import Fault
 from photostrip.notes import counted
-from photostrip.strip.image_coordinates import lens_distortion
+from photostrip.strip import lens_distortion
 
 FILM = Camera(
     "film",

@@ -20,8 +20,8 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.points import PhotoPoints
+from photostrip.strip.formed_strip import FormedStrip
 from photostrip.strip.resection import KnownPhotos, derivatives_by_point, project
-from photostrip.strip.strip_formation.strip import FormedStrip
 
 SMALLEST_ANGLE = 1e-4  # sine of the angle between the rays
 

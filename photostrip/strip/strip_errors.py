@@ -35,6 +35,7 @@ from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_omega_kappa
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.points import take_rows
+from photostrip.strip.formed_strip import FormedStrip
 from photostrip.strip.relative_orientation.orientation import BY_ROW, Orientation
 from photostrip.strip.relative_orientation.pairs import Pairs
 from photostrip.strip.relative_orientation.solution import (
@@ -43,7 +44,6 @@ from photostrip.strip.relative_orientation.solution import (
     normal_matrices,
     turns,
 )
-from photostrip.strip.strip_formation.strip import FormedStrip
 
 ELEMENTS = 5  # of a pair
 SCALE, COMPONENTS = 5, 6  # of a model: the elements of its pair, then the logarithm of the scale handed on

@@ -11,10 +11,10 @@ import pytest
 
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity
+from photostrip.strip.formed_strip import model_points
+from photostrip.strip.intersection import intersect
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.strip_formation.intersection import intersect
-from photostrip.strip.strip_formation.strip import model_points
 from tests.attitudes import rotation_x, rotation_y, rotation_z
 from tests.strips import MICROMETRE, measured
 

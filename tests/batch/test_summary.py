@@ -19,7 +19,7 @@ from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
 from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, counts, outcome_line
-from photostrip.report.page.progress import BatchTable, batch_table, clock
+from photostrip.report.page.progress import batch_progress
 from photostrip.report.page.text import to_text
 from tests.batch.projects import command, environment, write_projects
 
@@ -112,34 +112,17 @@ def test_a_record_comes_back() -> None:
 # ------------------------------------------------------------------------------------------------- meanwhile
 
 
-def test_how_far_and_how_long_still() -> None:
-    table = BatchTable(io.StringIO(), 10, live=False)
-    for name in ("a", "b", "c", "d"):
-        table.begun(name)
-    table.finished("a", failed=False, unchanged=False)
-    table.finished("b", failed=True, unchanged=False)
-    table.finished("x", failed=False, unchanged=True)
-    assert table.head(60.0) == "#########..................... 3 of 10, 1 failed, 1 unchanged, 1:00, about 3:30 to go"
-    cells = [list(column.cells) for column in table.page().columns]
-    assert cells == [["0:00", "0:00"], ["c", "d"]]
-
-
-@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (61, "1:01"), (3600 * 26 + 125, "26:02:05")])
-def test_clock(seconds: float, text: str) -> None:
-    assert clock(seconds) == text
-
-
 def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
     stream = io.StringIO()
-    with batch_table(stream, 2) as table:
-        table.say("one")
+    with batch_progress(stream, 2) as shown:
+        shown.say("one")
         assert stream.getvalue() == "one\n"
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_quick_start")
-def test_a_person_at_a_terminal_sees_a_table(tmp_path: Path) -> None:
-    """Stderr is a terminal: the table is there and goes away, failures stay above it; stdout is the summary alone."""
+def test_a_person_at_a_terminal_sees_a_bar(tmp_path: Path) -> None:
+    """Stderr is a terminal: a bar is there and goes away, failures stay above it; stdout is the summary alone."""
     write_projects(tmp_path / "strips", 12)
     (tmp_path / "strips" / "s3" / "control.csv").unlink()
     ours, theirs = pty.openpty()
@@ -163,6 +146,6 @@ def test_a_person_at_a_terminal_sees_a_table(tmp_path: Path) -> None:
     assert process.returncode == 2
     assert len(out.splitlines()) == 13
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen.decode())
-    assert re.search(r"[#.]{30} \d+ of 12", text)
+    assert re.search(r"\d+/12 \d:\d\d:\d\d .*strips/s", text)
     assert " of 12  strips/s3/project.yaml: faulty: strips/s3/project.yaml" in text
-    assert "strips/s4/project.yaml: good" not in text  # the table says enough
+    assert "strips/s4/project.yaml: good" not in text  # the bar says enough

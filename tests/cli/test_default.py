@@ -99,11 +99,3 @@ def test_where_no_bundle_can_be_had_it_is_the_polynomial_and_says_why(
     assert "self_calibration" in note["message"]
     assert document["status"] == "look"
     assert main(["run", str(project), "--set", "processing.adjustment=bundle", *UNDETERMINED]) == 3
-
-
-def test_the_covariance_adjustment_is_refused_with_its_successor(capsys: pytest.CaptureFixture[str]) -> None:
-    for wanted in ("processing.adjustment=covariance", "processing.covariance={distances: false}"):
-        assert main(["run", str(SAMPLE), "--set", wanted]) == 2
-        assert "`bundle`" in capsys.readouterr().err.replace("`adjustment: bundle`", "`bundle`")
-    assert main(["plan", "strip", "--methods", "covariance"]) == 2
-    assert "write `bundle`, which took its place" in capsys.readouterr().err

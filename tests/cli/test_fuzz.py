@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from random import Random
@@ -15,8 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.fuzzing import HARMS, Case, blocks, damaged, projects, tried
-from tests.source_tree import ROOT
+from tests.fuzzing import Case, blocks, damaged, projects, tried
 
 
 @pytest.fixture(scope="module")
@@ -63,36 +60,10 @@ def test_projects_that_ended_badly_end_well(
     assert tried(case, tmp_path, command).faults == (), case.done
 
 
-@pytest.mark.parametrize("number", range(4))
-def test_right_blocks_are_right(right_blocks: list[dict[str, bytes]], tmp_path: Path, number: int) -> None:
-    outcome = tried(Case(right_blocks[number]), tmp_path, "run")
-    assert outcome.code in {0, 1}
-    assert outcome.faults == ()
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_quick_start")
-def test_the_benchmark_prints_its_table() -> None:
-    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "12", "7"]
-    out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert out.startswith("12 cases, seed 7")
-    assert "wrong: 0" in out
-    numbers = [int(word) for line in out.splitlines() if line.startswith(("run", "check")) for word in line.split()[1:]]
-    assert sum(numbers) == 12
-
-
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_right_projects_are_right(right: list[dict[str, bytes]], tmp_path: Path, command: str) -> None:
     outcome = tried(Case(right[-1]), tmp_path, command)
     assert (outcome.code, outcome.faults) == (0, ())
-
-
-@pytest.mark.parametrize("harm", HARMS, ids=lambda harm: harm.__name__)
-def test_every_harm_does_some(right: list[dict[str, bytes]], harm: object) -> None:
-    assert callable(harm)
-    project = right[-1]
-    assert any(harm(data, Random(seed)) != data for seed in range(20) for data in project.values())
-    assert isinstance(harm(b"", Random(1)), bytes)
 
 
 def test_ids_that_no_table_shares_are_told(right_blocks: list[dict[str, bytes]], tmp_path: Path) -> None:
@@ -103,21 +74,3 @@ def test_ids_that_no_table_shares_are_told(right_blocks: list[dict[str, bytes]],
     )
     outcome = tried(Case(files), tmp_path, "run")
     assert (outcome.code, outcome.faults) == (3, ())
-
-
-# ------------------------------------------------------------------------------------------ the judge can condemn
-
-
-def test_a_changed_input_is_found(
-    right: list[dict[str, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def careless(arguments: list[str]) -> int:
-        Path(arguments[1]).write_text("mine now", encoding="utf-8")
-        (Path(arguments[1]).parent / ".result.json.1.tmp").write_text("", encoding="utf-8")
-        return 70
-
-    monkeypatch.setattr("tests.fuzzing.main", careless)
-    found = " ".join(tried(Case(right[0]), tmp_path, "run").faults)
-    assert "exit code 70" in found
-    assert "project.yaml was changed" in found
-    assert ".result.json.1.tmp was left behind" in found

@@ -14,8 +14,3 @@ def test_the_help_is_as_it_was(name: str) -> None:
 
 def test_no_help_of_a_command_that_is_gone() -> None:
     assert {path.stem for path in FOLDER.iterdir()} == set(helps())
-
-
-@pytest.mark.parametrize("name", sorted(helps()))
-def test_the_help_fits_on_a_terminal(name: str) -> None:
-    assert max(map(len, shown(helps()[name]).splitlines())) <= 80

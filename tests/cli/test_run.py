@@ -204,16 +204,6 @@ def test_wrong_usage_is_told(
     assert "Traceback" not in err
 
 
-def test_weak_geometry_gives_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    project = write_project(tmp_path, spec("local"))
-    control = (tmp_path / "control.csv").read_text(encoding="utf-8").splitlines()
-    (tmp_path / "control.csv").write_text("\n".join(control[:2]) + "\n", encoding="utf-8")
-    code, out, err = run(capsys, "run", project, "-o", tmp_path / "out")
-    assert (code, out) == (3, "")
-    assert "at least 2 control points" in err
-    assert not (tmp_path / "out").exists()
-
-
 # ----------------------------------------------------------------------------------------------- whole or not at all
 
 

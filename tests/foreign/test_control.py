@@ -108,23 +108,6 @@ def test_a_list_of_opendronemap_gives_the_result_of_the_native_project(
     agree(places(found), places(known), [name for name in block.control if name.startswith("G")])
 
 
-def test_longitudes_with_their_own_precision(tmp_path: Path) -> None:
-    import pyproj
-
-    block = Block(tmp_path)
-    known = block.without_checks()
-    to_degrees = pyproj.Transformer.from_crs("EPSG:32633", "EPSG:4326", always_xy=True)
-    for given in block.control.values():
-        lon, lat = to_degrees.transform(float(given["x"]), float(given["y"]))
-        given |= {"x": f"{lon:.10f}", "y": f"{lat:.10f}", "z": f"{given['z']},0.01,0.01,0.015"}
-    path = block.table("gcp_label,image_file_name,x,y,lon,lat,elev,lon_acc,lat_acc,elev_acc")
-    assert block.convert(path, "--crs", "EPSG:4326", "--force") == 0
-    project = tmp_path / "block" / "project.yaml"
-    with project.open("a", encoding="utf-8") as file:
-        file.write('output: {crs: "EPSG:32633"}\n')
-    agree(places(block.run()), places(known), [name for name in block.control if name.startswith("G")])
-
-
 @pytest.mark.parametrize("unknown", ["0", "NaN"])
 def test_heights_of_opendronemap_that_are_not_known(tmp_path: Path, unknown: str) -> None:
     block = Block(tmp_path)

@@ -483,17 +483,3 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_written(
     assert main(["convert", source, model, "-q", "--force"]) == 0
     assert main(["convert", source, str(tmp_path / "table.txt"), "--to", "orthority", "-q"]) == 0
     assert len(table(tmp_path / "table.txt")) == len(block.document["photos"])
-
-
-def test_independent_models_have_points_but_no_orientations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    photostrip.simulate({"models": {}, "control": {"layout": "bands", "bands": 3}}).write(tmp_path / "project")
-    assert main(["run", str(tmp_path / "project" / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
-    assert main(["convert", str(tmp_path / "run"), str(tmp_path / "a.gpkg"), "-q"]) == 0
-    layers = [name for name, _ in pyogrio.list_layers(tmp_path / "a.gpkg")]
-    assert layers[:2] == ["points", "control"]
-    assert "photos" not in layers
-    options = ["--set", "export=[points.gpkg,a/]"]
-    assert main(["check", str(tmp_path / "project" / "project.yaml"), *options]) == 2
-    assert "no orientation of photos, which a/ is made of" in capsys.readouterr().out
-    for name in ("a.csv", "a/"):
-        assert "no orientation of photos" in refused(capsys, str(tmp_path / "run"), f"{tmp_path}/{name}")

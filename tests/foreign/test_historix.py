@@ -109,14 +109,3 @@ def test_what_is_wrong_is_refused_with_its_place(tmp_path: Path, capsys: pytest.
     assert old in text
     (source / file).write_text(text.replace(old, new, 1), encoding="utf-8")
     assert expected in refused(capsys, source, tmp_path / "block", *OPTIONS)
-
-
-def test_a_distortion_has_no_unit_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = copied(tmp_path / "historix")
-    head, row = (source / FILES[0]).read_text(encoding="utf-8").splitlines()
-    (source / FILES[0]).write_text(f"{head},k1\n{row},0\n", encoding="utf-8")
-    assert convert(source, tmp_path / "zero", *OPTIONS, "-q") == 0
-    (source / FILES[0]).write_text(f"{head},k1\n{row},1e-8\n", encoding="utf-8")
-    assert "nothing says in which unit k1 is" in refused(capsys, source, tmp_path / "block", *OPTIONS)
-    (source / FILES[0]).write_text(f"{head}\n{row}\n{row}\n", encoding="utf-8")
-    assert "2 cameras, and nothing says which photo has which" in refused(capsys, source, tmp_path / "block", *OPTIONS)

@@ -15,7 +15,6 @@ import photostrip
 from photostrip.geometry.rotation import from_angles
 from photostrip.project.check import check_project
 from photostrip.result.table import rows_of
-from tests.foreign import colmap_models
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
 from tests.foreign.metashape_models import SCALE, UTM, cameras, document, label_of, markers, simulated
@@ -170,25 +169,6 @@ def test_references_of_cameras_are_their_positions(tmp_path: Path, capsys: pytes
         "photo,x,y,z,sx,sy,sz",
         "DJI_0,15.3,49.2,410.0,1.0,1.0,2.0",
     ]
-
-
-def test_markers_beside_a_block_of_another_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Photos are found by their names without an ending."""
-    truth = simulated(tmp_path / "native", control=CONTROL)
-    model = colmap_models.simulated(tmp_path / "same", ground={"crs": "EPSG:32633"}, control=CONTROL)
-    source, (lines, marks) = tmp_path / "markers.xml", markers(tmp_path / "native", truth)
-    photos = [
-        f'<camera id="{40 + number}" label="Фото {photo["id"]}" sensor_id="7"/>'
-        for number, photo in enumerate(rows_of(truth["photos"]))
-    ]
-    source.write_text(document(photos, (lines, marks), UTM, np.zeros((1, 3))), encoding="utf-8")
-    block = model.write_text(tmp_path / "model")
-    assert convert(block, tmp_path / "block", "--control", str(source)) == 0
-    assert "49 points, 25 of them check points, 354 marks" in capsys.readouterr().out
-    found, known = run(tmp_path / "block" / "project.yaml"), run(tmp_path / "native" / "project.yaml")
-    for point in nonempty(each for each in known["points"] if each[0] in "GK"):
-        expected = [known["points"][point][axis] for axis in "xyz"]
-        assert [found["points"][point][axis] for axis in "xyz"] == pytest.approx(expected, abs=3e-4)
 
 
 # ---------------------------------------------------------------------------------------------------- refusals

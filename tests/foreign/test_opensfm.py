@@ -116,30 +116,6 @@ def test_a_wrong_reconstruction_is_refused_with_its_record(
     )
 
 
-@pytest.mark.parametrize(
-    ("name", "data", "expected"),
-    [
-        ("reconstruction.json", b"", "reconstruction.json: is empty"),
-        ("reconstruction.json", b"[]", "reconstruction.json: has no reconstruction in it"),
-        ("reconstruction.json", b'[\n{"a": 1, "a": 2}]', "reconstruction.json: `a` stands twice in a block"),
-        ("reconstruction.json", b"[\n{]", "reconstruction.json:2:2: is not JSON"),
-        ("reconstruction.json", b"\x89PNG\x00", "reconstruction.json: is not text"),
-        ("reconstruction.json", b"[" * 100_000, "reconstruction.json: is nested too deeply"),
-        ("tracks.csv", b"OPENSFM_TRACKS_VERSION_v9\n", "tracks.csv:1: version 9 of the tracks is not known"),
-        ("tracks.csv", b"a.jpg\t1\t2\t0.1\n", "tracks.csv:1: 4 values in the line; expected 8 with tabs"),
-        ("tracks.csv", b"\na.jpg\t1\t2\tnan\t0\t1\t1\t1\n", "tracks.csv:2: `nan` is no image coordinate"),
-        ("tracks.csv", b"\n\n", "tracks.csv: no point stands on two photos"),
-    ],
-)
-def test_what_is_no_such_file_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, data: bytes, expected: str
-) -> None:
-    whole, rays = small()
-    source = write(tmp_path / "opensfm", [whole], rays)
-    (source / name).write_bytes(data)
-    assert expected in refused(capsys, source, tmp_path / "block")
-
-
 def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path / "site" / "opensfm", [small()[0]], small()[1])
     told = refused(capsys, tmp_path / "site", tmp_path / "block")
@@ -185,14 +161,3 @@ def test_wrong_control_is_refused_with_its_record(
     told = refused(capsys, source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1")
     assert "gcp.json: " in told
     assert expected in told
-
-
-def test_control_asks_for_its_precision_and_for_no_width(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
-    control = tmp_path / "gcp.json"
-    point = {"id": "G", "position": {"latitude": 1, "longitude": 2, "altitude": 3}, "observations": []}
-    control.write_text(json.dumps({"points": [point]}), encoding="utf-8")
-    told = refused(capsys, source, tmp_path / "block", "--control", str(control))
-    assert "nothing says how precise the control is" in told
-    given = ("--control", str(control), "--control-sigma", "0.1", "--mark-width", "100")
-    assert "the marks are parts of the photo" in refused(capsys, source, tmp_path / "block", *given)

@@ -13,7 +13,7 @@ from pyproj import Proj, Transformer
 
 from photostrip.errors import InputError
 from photostrip.geodesy.tying import tie_frames
-from tests.geodesy.frames import NEU, frame, krueger, spec
+from tests.geodesy.frames import frame, krueger, spec
 
 if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -22,7 +22,6 @@ MICROMETRE = 1e-6  # m
 NANORADIAN = 1e-9
 WGS84 = {"a": 6378137.0, "flattening": 1.0 / 298.257223563}
 US_FOOT = 1200.0 / 3937.0
-MOON = 1737400.0
 UTM33 = frame("EPSG:32633")
 
 # crs, west, east, south, north: where each of these is in use
@@ -90,16 +89,6 @@ def test_two_zones_meet_in_one_point(first: str, second: str, lon: float, across
     assert np.abs(found[0] - cartesian(UTM33, np.array([*point, up]))).max() < MICROMETRE
 
 
-def test_gauss_krueger_zones_with_their_numbers_in_front() -> None:
-    (west, east), out = tie_frames([spec("EPSG:28404", axes=NEU), spec("EPSG:28405", axes=NEU)])
-    point = np.radians([24.0, 42.7])
-    xyz = cartesian(west, np.array([24.0, 42.7, 600.0]))
-    user = [grid.user_from_internal(grid.ground_from_cartesian(xyz))[0] for grid in (west, east)]
-    assert [int(columns[1] // 1e6) for columns in user] == [4, 5]  # y, the second column, carries the zone
-    assert user[0][0] == pytest.approx(user[1][0], abs=1e-6)  # the boundary is as far from both meridians
-    assert out.geodetic(xyz)[0] == pytest.approx((*point, 600.0))
-
-
 @given(lon=st.floats(11.0, 19.0), lat=st.floats(-80.0, 84.0))
 def test_transverse_mercator_is_that_of_krueger_s_series(lon: float, lat: float) -> None:
     expected, convergence = krueger(np.array([[lon, lat]]), **WGS84, lon_0=15.0, k0=0.9996)
@@ -155,16 +144,6 @@ def test_feet_in_plan_and_metres_in_height() -> None:
     assert grid.ground_from_cartesian(xyz)[0] == pytest.approx((300000.0 / US_FOOT, 0.0, 12.0), abs=1e-5)
     a, b = np.array([[984250.0, 100.0, 12.0]]), np.array([[984249.0, 97.0, 10.0]])
     assert grid.difference(a, b)[0] == pytest.approx((US_FOOT, 3.0 * US_FOOT, 2.0))
-
-
-def test_the_moon_by_its_code_and_by_its_radius_is_one() -> None:
-    specs = [spec("IAU_2015:30110"), spec("+proj=eqc +R=1737400"), spec("geocentric", ellipsoid=(MOON, MOON))]
-    (code, radius, geocentric), _ = tie_frames(specs)
-    point = [[math.radians(26.1) * MOON, math.radians(3.6) * MOON, -1900.0]]
-    xyz = code.cartesian_from_ground(point)
-    assert radius.cartesian_from_ground(point) == pytest.approx(xyz, abs=MICROMETRE)
-    assert geocentric.ground_from_cartesian(xyz) == pytest.approx(xyz)
-    assert np.linalg.norm(xyz) == pytest.approx(MOON - 1900.0)
 
 
 @given(

@@ -12,7 +12,6 @@ from photostrip.geodesy.local_frame import (
     IntermediateFrame,
     axes_matrix,
     geocentric_from_geodetic,
-    mean_position,
     strip_azimuth,
 )
 
@@ -61,13 +60,6 @@ def test_the_printed_signs_of_eq_143_do_not_make_a_rotation() -> None:
     printed[0, 1] -= 2.0 * np.sin(lon) * np.cos(a0)  # the last term of a2, and below of b1, with a minus sign
     printed[1, 0] -= 2.0 * np.cos(lon) * np.sin(a0)
     assert np.abs(printed.T @ printed - np.eye(3)).max() > 0.1
-
-
-def test_mean_longitude_near_180_degrees() -> None:
-    lat, lon, height = mean_position(np.radians([10.0, 20.0]), np.radians([179.0, -179.0]), [100.0, 300.0])
-    assert np.degrees(lat) == pytest.approx(15.0)
-    assert abs(np.degrees(lon)) == pytest.approx(180.0)
-    assert height == pytest.approx(200.0)
 
 
 @given(

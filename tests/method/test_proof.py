@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from pyproj import Proj
 
 from photostrip.camera import Camera, Distortion
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
@@ -135,41 +135,30 @@ def assert_exact(found: Recovery) -> None:
 # ------------------------------------------------------------------------------------------------ free of errors
 
 
-MOON = "+proj=longlat +a=1737400 +b=1737400 +no_defs"
-
-
 @pytest.mark.parametrize(
     ("ground", "control"),
     [
-        (Ground(crs="EPSG:32733", center_deg=(15.3, -33.0)), {}),
         (Ground(crs="EPSG:32633", center_deg=(17.9, 70.0)), {}),  # convergence 2.7 degrees
         (Ground(crs="EPSG:32660", center_deg=(180.0, 52.0)), {}),
-        (Ground(crs="EPSG:4979", center_deg=(180.0, -17.0)), {}),
-        (Ground(crs="EPSG:32633", center_deg=(18.0, 49.0)), {"second_crs": "EPSG:32634"}),
         (Ground(crs="EPSG:32760", center_deg=(180.0, -17.0)), {"second_crs": "EPSG:32701"}),
         (Ground(crs="EPSG:31467", axes=("north", "east", "up"), center_deg=(9.4, 48.0)), {}),
         (Ground(crs="EPSG:4326", axes=("north", "east", "up")), {}),
         (Ground(height="orthometric", geoid_undulation=44.7), {}),
         (Ground(crs="geocentric", axes=("x", "y", "z")), {}),
         (Ground(crs="local"), {}),
-        (Ground(crs=MOON, center_deg=(-23.5, 0.7)), {}),
         (Ground(crs="geocentric", axes=("x", "y", "z"), ellipsoid=(1_737_400.0, 1_737_400.0)), {}),
         (Ground(crs="EPSG:3413", center_deg=(-45.0, 88.0)), {}),
         (Ground(crs="EPSG:2263", center_deg=(-74.0, 40.7)), {}),  # plan in US survey feet
     ],
     ids=[
-        "south",
         "edge of a zone",
         "UTM at 180",
-        "degrees across 180",
-        "two zones",
         "two zones at 180",
         "Gauss-Krueger, north first",
         "latitude, longitude",
         "heights above the geoid",
         "geocentric",
         "local",
-        "moon, degrees",
         "moon, geocentric",
         "near the pole",
         "feet",
@@ -190,13 +179,11 @@ def test_any_ground_frame_comes_back(ground: Ground, control: dict[str, str]) ->
     [
         (Control(layout="corners"), "EPSG:32633"),
         (Control(layout="corners+centre"), "local"),
-        (Control(layout="random", count=6), "EPSG:32633"),
         (Control(bands=4, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}), "local"),
         (Control(bands=4, use={"xy": 0.4, "z": 0.6}), "EPSG:32633"),
-        (Control(bands=4, use={"xy": 0.4, "z": 0.6}), "local"),
         (Control(bands=2, per_band=2), "EPSG:32633"),
     ],
-    ids=["corners", "corners and centre", "anywhere", "mixed", "plan or height", "the same, local", "two bands of two"],
+    ids=["corners", "corners and centre", "mixed", "plan or height", "two bands of two"],
 )
 def test_any_control_that_determines_the_strip_brings_it_back(control: Control, crs: str) -> None:
     assert_exact(recovered(exact(Spec(ground=Ground(crs=crs, center_deg=(16.5, 49.2)), control=control))))
@@ -353,17 +340,6 @@ def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
     assert found.rotations > 1e-6
     assert float(np.median(strip.of_photos.orientation.sigma0)) == pytest.approx(0.005, rel=0.15)
     assert 0.003 < float(np.sqrt((strip.of_photos.resection.residuals**2).mean())) < 0.008  # mm
-
-
-@pytest.mark.slow
-def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
-    """Limits of ten models and three bands, in units of sigma at photo scale; floors at half of them."""
-    found = rms(strip_of(10, 3), 12, "similarity", "2", "auto")
-    assert (found["2"] < [2.1, 2.3, 4.5]).all()
-    assert (found["2"] > 0.5 * np.array([2.1, 2.3, 4.5])).all()
-    assert (found["similarity"] < 1.15 * np.array([3.4, 3.2, 7.0])).all()
-    assert (found["similarity"] > found["2"]).all()
-    assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["2"])
 
 
 @pytest.mark.slow

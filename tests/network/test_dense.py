@@ -11,7 +11,7 @@ import pytest
 
 from photostrip.geometry.rotation import from_vector
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import JointCofactors, cofactors_of
+from photostrip.network.cofactors import cofactors_of
 from photostrip.network.problem import AttitudeObservations, BundleProblem, ControlObservations, PositionObservations
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Points, Spec, simulate
@@ -168,25 +168,6 @@ def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
         )
     ]
     assert sum(every) + parts.sum() == pytest.approx(solution.redundancy, abs=1e-5)
-
-
-@pytest.mark.parametrize("name", ["block", "everything"])
-def test_functions_of_photos_have_joint_cofactors(name: str) -> None:
-    """Three functions of photos one beside the other, in any order: the photos' own cofactors carried over."""
-    problem = PROBLEMS[name]()
-    solution = solve(problem)
-    joint, m = JointCofactors.of_solution(solution), problem.photos
-    functions = np.random.default_rng(4).normal(size=(m, 1, 3, 6))
-    own, photos = functions[:, 0], cofactors_of(solution).photos
-    np.testing.assert_allclose(
-        joint.of(np.arange(m)[:, None], functions), own @ photos @ own.swapaxes(1, 2), rtol=1e-7, atol=1e-18
-    )
-    expected = dense(problem, solution).cofactors[: 6 * m, : 6 * m].reshape(m, 6, m, 6)
-    for some in ((1, 0), (0, 2, 1), (m - 1, 0, 2)):
-        sets, by = np.array([some]), functions[list(some), 0]
-        wanted = np.einsum("icp,ipjq,jdq->icjd", by, expected[list(some)][:, :, list(some)], by)
-        found = joint.of(sets, by[None])[0].reshape(wanted.shape)
-        np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
 
 
 def test_thousands_of_photos_without_control_keep_their_redundancy_numbers() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photostrip.network.band import Band
+from photostrip.network.normal_equations import Band
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

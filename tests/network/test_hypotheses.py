@@ -95,6 +95,14 @@ def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
         assert found.squares == pytest.approx(solution.chi_square - after.chi_square, rel=2e-3, abs=1e-3)
 
 
+def test_a_hypothesis_whose_columns_others_have_taken_up_explains_nothing() -> None:
+    """Two causes of a camera may both hold its distance: asked about again, the one within the other has no column."""
+    problem = with_positions_and_lists()
+    (distance,) = (each for each in asked(solve(problem)) if each.kind == DISTANCE)
+    after = solve(hypotheses.taken_up(problem, distance))
+    assert hypotheses.log_probability_again(after, distance, 1.0) == 0.0
+
+
 def moved(problem: BundleProblem, number: int) -> float:
     """Fall of the sum of squares when a control list is moved to where it fits, found by a search."""
     control, solution = problem.control, solve(problem)

@@ -73,15 +73,3 @@ def test_a_wrong_height_among_five_points_is_not_good(metres: float, status: str
     control = replace(inputs.control, enu=enu).take(np.array([0, 2, 4, 6, 8]))
     document = solved(replace(inputs, control=control), TURNED).document
     assert document["status"] == status, document["verdict"]
-
-
-def test_control_that_cannot_be_spared_verifies_nothing() -> None:
-    inputs = without_checks()
-    few = inputs.control.take(np.array([0, 2, 7]))
-    document = solved(replace(inputs, control=few), replace(TURNED, adjustment="similarity")).document
-    block = document["cross_validation"]
-    assert [fold["left_out"] for fold in block["folds"]] == [[name] for name in few.ids]
-    assert all(fold["reason"] for fold in nonempty(block["folds"]))
-    assert (block["points"], block["p"], block["plan"]["count"]) == ([], None, None)
-    assert document["verdict"]["verified"] is False
-    assert "the control left out in turn cannot (" in document["verdict"]["verification"]

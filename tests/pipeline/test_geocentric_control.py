@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from photostrip.errors import InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs
@@ -56,13 +55,3 @@ def test_misclosures_are_east_north_and_up(both: tuple[Result, Result]) -> None:
     np.testing.assert_allclose(second, first, rtol=0, atol=MILLIMETRE)
     up = [r.strips[0].absolute.misclosures[:, 2] for r in both]
     np.testing.assert_allclose(up[1], up[0], rtol=0, atol=MILLIMETRE)
-
-
-@pytest.mark.parametrize("counted", [(True, False, True), (False, True, False)])
-def test_half_of_a_plan_position_is_refused(both: tuple[Result, Result], counted: tuple[bool, ...]) -> None:
-    inputs = both[0].inputs
-    use = inputs.control.use.copy()
-    use[1] = counted
-    with pytest.raises(InputError, match="one plan coordinate counts without the other") as caught:
-        triangulate(replace(inputs, control=replace(inputs.control, use=use)), both[0].settings)
-    assert caught.value.faults[0].code == "half-plan-use"

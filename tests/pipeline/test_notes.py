@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
 
-from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.notes import polynomial_notes
-from photostrip.result.document import document_of
-from photostrip.simulation import Control, Flight, Spec, simulate
-from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.inputs import Inputs, Strip
+    from photostrip.pipeline.inputs import Strip
     from photostrip.strip.polynomial import Polynomial
 
 
@@ -37,20 +31,3 @@ def test_points_beyond_the_control_are_told_with_how_far(begin: float, end: floa
     points = "2 points lie" if begin < -500.0 and end > 5000.0 else "1 point lies"
     words = "" if beyond is None else f"{points} up to {beyond} m beyond the control"
     assert words in " ".join(note.message for note in notes)
-
-
-def without_far_control(share: float) -> Inputs:
-    """Give a strip the control of its first part alone."""
-    made = simulate(Spec(flight=Flight(photos=16), control=Control(every=3, check=4)))
-    inputs = inputs_of(made)
-    control = inputs.control
-    along = control.enu[:, 0]  # the flight goes east
-    kept = control.check | (along <= along.min() + share * np.ptp(along))
-    return replace(inputs, control=control.take(kept))
-
-
-@pytest.mark.parametrize("share", [0.7, 1.0])
-def test_points_beyond_the_control_are_told_once(share: float) -> None:
-    document = document_of(triangulate(without_far_control(share), Settings()))
-    beyond = [each for each in document["verdict"]["look_at"] if "beyond the control" in each]
-    assert [each[:4] for each in beyond] == ["P503"] * (share < 1.0)

@@ -30,11 +30,3 @@ def test_five_points_hardly_check_each_other(method: str, photos: int) -> None:
 def test_three_bands_of_three_check_each_other(method: str) -> None:
     """An error of any of them stands out."""
     assert remarks(Control(bands=3), method) == []
-
-
-@pytest.mark.slow
-def test_a_block_is_looked_at_as_a_whole() -> None:
-    """Its strips hold each other."""
-    assert remarks(Control(bands=3), "bundle", photos=6, strips=3) == []
-    (message,) = remarks(Control(layout="corners"), "bundle", photos=12)
-    assert message.startswith("the block: ")

@@ -11,12 +11,9 @@ from photostrip.planning.camera_efficiency import (
     PRINTED_BASE,
     PRINTED_TABLE,
     ComparedCamera,
-    FlownSurvey,
-    HighGround,
     compare,
     sigma_from_mean_distortion,
     source_cameras,
-    suitability,
 )
 from tests.vectors import cases
 
@@ -65,8 +62,6 @@ def test_the_printed_table_and_its_misprints() -> None:
 
 # --------------------------------------------------------------------------------- distortion, ground and what it costs
 
-FILM = ComparedCamera("film", focal=153.0, sigma=0.007, base=92.0, width=161.0, length=230.0)
-
 
 def test_a_parallax_from_measuring_and_mean_distortion_scatters_so() -> None:
     rng = np.random.default_rng(7)
@@ -77,25 +72,3 @@ def test_a_parallax_from_measuring_and_mean_distortion_scatters_so() -> None:
     found = sigma_from_mean_distortion(measuring, float(np.abs(radial).mean()))
     assert (x[:, 0] - x[:, 1]).std() == pytest.approx(found, rel=0.01)
     assert sigma_from_mean_distortion(measuring, 0.0) == pytest.approx(np.sqrt(2) * measuring)
-
-
-def photos_of(place: float, height: float, flying_height: float, camera: ComparedCamera) -> int:
-    """Count the photos of a long strip that show a point of its axis, by projecting it."""
-    assert camera.length is not None
-    centres = np.arange(-20, 21) * camera.base * flying_height / camera.focal
-    x = camera.focal * (place - centres) / (flying_height - height)
-    return int((np.abs(x) < camera.length / 2).sum())
-
-
-def test_the_largest_relief_is_where_no_point_is_left_on_three_photos() -> None:
-    survey = FlownSurvey(flying_height=1500.0)
-    highest = suitability(FILM, survey).relief / 2
-    assert highest == pytest.approx(300.0)  # H (1 - 2 b / L), a fifth of H at 60 % overlap
-    places = np.linspace(0.0, 2000.0, 4001)
-    most = [max(photos_of(x, h, 1500.0, FILM) for x in places.tolist()) for h in (highest - 5, highest + 5)]
-    assert most == [3, 2]
-    found = suitability(FILM, FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=400.0)))
-    overlap = (230.0 - 92.0 * 1500 / 1300) / 230.0
-    assert found.lap == pytest.approx(overlap)
-    assert found.suits
-    assert not suitability(FILM, FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))).suits

@@ -17,9 +17,6 @@ from photostrip.planning.screening import (
 from photostrip.strip.relative_orientation.orientation import orient_unchecked
 from tests.loops import nonempty
 
-F, B, A = 100.0, 60.0, 70.0
-SIX = PairLayout(focal=F, base=B, width=A, counts=(1,) * 6, scatter=0.0, tilt=0.0, relief=0.0, parallax_sigma=0.0)
-
 
 @pytest.mark.slow
 def test_the_published_rates() -> None:
@@ -29,23 +26,6 @@ def test_the_published_rates() -> None:
     assert rates == pytest.approx([51.9, 41.7, 6.4], abs=3.0)
     assert rates.sum() == pytest.approx(100.0)
     assert 44 * found.lost == pytest.approx(1.1, abs=0.7)
-
-
-def test_effects_on_six_standard_points_are_those_of_the_closed_form() -> None:
-    effects = error_effects(standard_pairs(np.random.default_rng(1), 2, SIX), SIX)
-    omega = np.array([2, 2, 1, 1, 1, 1]) * F / (4 * A**2)
-    signed = np.array([-2, -2, 1, 1, 1, 1]) * F / (4 * A**2) * (F + 2 * A**2 / (3 * F))  # omega2' (f + 2a²/3f)
-    even, odd = np.array([0, 1, 0, 1, 0, 1]) / 3, np.array([1, 0, 1, 0, 1, 0]) / 3
-    expected = [
-        np.array([0, 0, 0, 1, 0, 1]) * F / (2 * A * B),
-        (signed - even) / B,
-        np.array([0, 0, 1, 0, 1, 0]) * F / (2 * A * B),
-        omega,
-        (signed - odd) / B,
-    ]
-    found = np.array([effect.elements for effect in effects]).T
-    assert found == pytest.approx(np.abs(expected), rel=1e-9, abs=1e-15)
-    assert [effect.largest for effect in effects] == pytest.approx(np.abs(expected).max(axis=0), rel=1e-9)
 
 
 def test_effects_are_what_orienting_again_finds() -> None:

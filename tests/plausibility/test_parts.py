@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.plausibility import flight, flight_order, given_points
+from photostrip.plausibility import flight, flight_order
 from photostrip.plausibility.ids import TiesOfStrips, odd_ties
 from photostrip.plausibility.slips import slip
 from photostrip.simulation.simulation import simulate
@@ -119,34 +119,6 @@ def test_what_does_not_go_with_its_neighbours_is_named() -> None:
     assert flown(straight(), below) == [("P204", ("2",))]
 
 
-# --------------------------------------------------------------------------------------------------------- layout
-
-
-def laid_out(along: list[float], across: list[float], photos: int = 8) -> list[str]:
-    """Examine control given by its places along (photos) and across (half breadths) a strip."""
-    plan = np.column_stack([100.0 * np.array(along), 150.0 * np.array(across)])
-    names = [f"G{number}" for number in range(len(along))]
-    listed = [f"{number}" for number in range(photos)]
-    on_a_line = given_points.find_line(plan, 150.0, names, "strip A", ["A"])
-    return [each.code for each in (*on_a_line, *given_points.find_weak_ends(np.array(along), listed, "A", names))]
-
-
-def test_where_control_lies() -> None:
-    across = [-0.8, 0.0, 0.8]
-    assert laid_out([0, 0, 0, 7, 7, 7], across * 2) == []
-    assert laid_out([0, 0, 0, 2, 2, 2], across * 2) == ["P501"]
-    assert laid_out([0, 0, 0, 4, 4, 4], across * 2) == ["P503"]
-    assert laid_out([0, 3, 7], [0.01, -0.02, 0.01]) == ["P502"]
-    assert laid_out([0, 3, 7], [0.4, -0.5, 0.4]) == []
-
-
-def test_findings_on_the_layout_count_photos_from_one() -> None:
-    names, photos = ["a", "b", "c", "d", "e", "f"], [f"{number}" for number in range(8)]
-    place = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
-    (found,) = given_points.find_weak_ends(place, photos, "A", names)
-    assert found.evidence == {"first_control_at_photo": 2.0, "last_control_at_photo": 4.0, "photos": 8}
-
-
 # --------------------------------------------------------------------------------------------------------- angles
 
 
@@ -169,15 +141,6 @@ def test_angles_in_another_unit(factor: float, word: str) -> None:
     assert finding.code == "P601"
     assert f"; as {word} they differ by 0.00" in finding.message
     assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_angles_in_another_system() -> None:
-    values, matrices = attitudes()
-    names = [f"{number}" for number in range(len(values))]
-    for wrong in (values * [1, 1, -1], values + np.array([0, 0, np.pi / 2]), values * [-1, 1, 1]):
-        assert [each.code for each in flight.find_wrong_angles(wrong, "omega-phi-kappa", matrices, names)] == ["P602"]
-    rough = values + np.random.default_rng(1).normal(0, np.radians(3), values.shape)
-    assert list(flight.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
 
 
 def test_yaw_pitch_roll_of_a_gimbal() -> None:

@@ -14,7 +14,6 @@ from photostrip.errors import InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.loading import Project, load_project
-from tests.loops import nonempty
 from tests.project.samples import CONTROL, MARKED_FILES, OBSERVATIONS, PROJECT, Sample, sample
 
 if TYPE_CHECKING:
@@ -536,11 +535,3 @@ def test_a_project_may_be_json(tmp_path: Path) -> None:
     sample(tmp_path)
     project.write("project.yaml", json.dumps(yaml.safe_load(PROJECT.replace("EPSG:32633", "'EPSG:32633'"))))
     assert project.load().inputs.strips[0].photos == ("1001", "1002")
-
-
-def test_an_id_is_one_text_in_all_tables(tmp_path: Path) -> None:
-    """The ids of many check points take megabytes."""
-    project = sample(tmp_path).load()
-    measured = {name: name for name in project.inputs.observations.point_ids}
-    shared = [name for name in project.inputs.control.ids if name in measured]
-    assert all(measured[name] is name for name in nonempty(shared))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from photostrip.project.plans.flown import all_positive
+from photostrip.project.plans import all_positive
 
 
 @pytest.mark.parametrize("sigma", [(0.0, 0.0, 0.01), (0.01, 0.0, 0.0), (0.1, 0.2, 0.3)])

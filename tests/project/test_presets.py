@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, Sample, sample
 from tests.source_tree import ROOT
 
@@ -41,10 +39,6 @@ def bare(folder: Path, preset: Path, files: dict[str, str]) -> Sample:
     return project
 
 
-def test_all_presets_are_here() -> None:
-    assert [preset.stem for preset in PRESETS] == sorted(SCALE)
-
-
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda path: path.stem)
 def test_a_preset_completes_a_project(tmp_path: Path, preset: Path) -> None:
     loaded = bare(tmp_path, preset, FILES).load()
@@ -57,13 +51,6 @@ def test_a_preset_completes_a_project(tmp_path: Path, preset: Path) -> None:
 @pytest.mark.parametrize("preset", [p for p in PRESETS if "film" in p.stem], ids=lambda path: path.stem)
 def test_film_presets_take_fiducial_marks(tmp_path: Path, preset: Path) -> None:
     assert bare(tmp_path, preset, MARKED_FILES).load().inputs.fiducials is not None
-
-
-@pytest.mark.parametrize("preset", PRESETS, ids=lambda path: path.stem)
-def test_every_line_says_what_it_is_for(preset: Path) -> None:
-    for line in nonempty(preset.read_text(encoding="utf-8").splitlines()):
-        section = re.fullmatch(r"\s*\w+:", line)
-        assert not line or section or " # " in line or line.startswith("# "), line
 
 
 def test_a_standard_deviation_never_takes_its_unit_from_another_file(tmp_path: Path) -> None:

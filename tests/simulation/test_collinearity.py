@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from pyproj import CRS, Proj, Transformer
 
-from photostrip.camera import Distortion
-from photostrip.simulation import FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
+from photostrip.simulation import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
 from tests.attitudes import rotation_x, rotation_y, rotation_z
 
 NANOMETRE = 1e-6  # mm
@@ -118,30 +117,6 @@ def test_strips_flown_back_are_turned() -> None:
     first, last = done.truth.centers[10], done.truth.centers[19]
     assert last[0] < first[0]
     assert first[1] > done.truth.centers[:10, 1].max()  # the next strip lies to the left of the first
-
-
-@pytest.mark.parametrize("direction", ["image_to_ideal", "ideal_to_image"])
-def test_distortion_is_the_formula_of_the_project_file(direction: str) -> None:
-    (k1, k2, k3), (p1, p2) = (2e-8, -1e-12, 2e-17), (3e-7, -2e-7)
-    camera = replace(
-        FILM, principal_point=(0.3, -0.2), distortion=Distortion("brown", direction, (k1, k2, k3), (p1, p2))
-    )
-    spec = replace(FREE, ground=Ground(crs="local"), camera=camera)
-    done = simulate(spec)
-    ideal = collinear(done, done.truth.ground.xyz, done.truth.centers_ground, done.truth.rotations_local)
-    image = done.observations.xy - camera.principal_point
-    X, Y = (image if direction == "image_to_ideal" else ideal).T
-    r2 = X**2 + Y**2
-    radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
-    D = np.stack(
-        [
-            X * radial + p1 * (r2 + 2 * X**2) + 2 * p2 * X * Y,
-            Y * radial + p2 * (r2 + 2 * Y**2) + 2 * p1 * X * Y,
-        ],
-        axis=-1,
-    )
-    assert np.abs(D).max() > 0.01
-    assert np.abs((ideal - image if direction == "image_to_ideal" else image - ideal) - D).max() < NANOMETRE
 
 
 @pytest.mark.parametrize("crs", ["local", "EPSG:32633"])

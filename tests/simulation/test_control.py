@@ -51,30 +51,6 @@ def test_bands(photos: int, bands: int, every: int | None, expected: list[int]) 
     assert all(station in seen[3 * k + i] for k, station in nonempty(enumerate(expected)) for i in range(3))
 
 
-@pytest.mark.parametrize(("layout", "count"), [("corners", 4), ("corners+centre", 5)])
-def test_corners(layout: str, count: int) -> None:
-    done = simulate(Spec(ground=Ground(crs="local"), control=Control(layout=layout, check=0, noise=NONE)))
-    east, north = done.control.enu[:, :2].T
-    assert len(done.control) == count
-    corner = np.arange(count) != 2 if count == 5 else np.ones(4, dtype=bool)
-    assert np.abs(east[corner]) == pytest.approx(4.5 * 920.0, rel=0.05)
-    assert np.abs(north[corner]) == pytest.approx(920.0, rel=0.15)
-    assert len({(e > 0, n > 0) for e, n in done.control.enu[corner, :2]}) == 4
-    if count == 5:
-        assert np.abs(done.control.enu[2, :2]).max() < 700.0
-
-
-def test_random_control_and_check_points_are_as_many_as_asked_for() -> None:
-    done = simulate(Spec(flight=Flight(strips=2), control=Control(layout="random", count=9, check=12)))
-    control = done.control
-    assert (~control.check).sum() == 18
-    assert control.check.sum() == 12
-    assert len(set(control.ids)) == 30
-    assert set(control.ids) <= set(done.observations.point_ids)
-    other = simulate(Spec(seed=2, flight=Flight(strips=2), control=Control(layout="random", count=9, check=12)))
-    assert not np.allclose(other.control.enu, control.enu)
-
-
 @pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:4979", "geocentric", "local"])
 def test_noise_is_normal_and_as_large_as_stated(crs: str) -> None:
     sigma = np.array([0.03, 0.06, 0.12])

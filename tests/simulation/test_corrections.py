@@ -16,12 +16,8 @@ from photostrip.simulation.measuring import sheets
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import FILM as CAMERA
 from photostrip.simulation.spec import Film, Flight, Image, Spec, Terrain
-from photostrip.strip.image_coordinates import corrections, interior
-from photostrip.strip.image_coordinates.corrections import (
-    ImageCorrectionSettings,
-    InteriorSettings,
-    refraction_constant,
-)
+from photostrip.strip import corrections, interior
+from photostrip.strip.corrections import ImageCorrectionSettings, InteriorSettings, refraction_constant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

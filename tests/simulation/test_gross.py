@@ -11,7 +11,6 @@ from photostrip.errors import InputError
 from photostrip.points import locate
 from photostrip.simulation import (
     Control,
-    Film,
     Flight,
     GrossError,
     Ground,
@@ -46,19 +45,6 @@ def test_a_named_image_error() -> None:
     ((place, size),) = changed(done).items()
     assert place == (row_of(done, "1003", "1002-2"), 1)
     assert size == pytest.approx(-0.25)
-
-
-def test_random_image_errors() -> None:
-    entries = (GrossError("image", count=40, size_um=100.0), GrossError("image", count=20, size_um=500.0, axis="x"))
-    done = simulate(replace(FREE, film=Film(), gross_errors=entries))
-    listed = {(row_of(done, e.photo, e.point), "xy".index(e.axis)): e.size for e in done.truth.errors}
-    assert len(listed) == 60
-    assert changed(done) == pytest.approx(listed)
-    assert len({row for row, _ in listed}) == 60  # no image point twice
-    first = [e for e in done.truth.errors if abs(e.size) < 0.2]
-    assert {e.axis for e in first} == {"x", "y"}
-    assert {e.size for e in first} == {0.1, -0.1}
-    assert {e.axis for e in done.truth.errors if abs(e.size) > 0.2} == {"x"}
 
 
 def test_points_mistaken_for_each_other() -> None:

@@ -166,23 +166,6 @@ def test_an_optimiser_finds_the_same_for_any_mixture_and_any_weights(use: dict[s
 # ------------------------------------------------------------------------------------ back to the truth
 
 
-@pytest.mark.parametrize(
-    "use",
-    [
-        {"A": "xy", "H": "xy", "B": "z", "C": "z", "G": "z"},
-        {"A": "xyz", "H": "xyz", "B": "z"},
-        {"A": "xyz", "D": "z", "G": "z", "H": "xy"},
-    ],
-    ids=["2 plan + 3 height", "2 full + 1 height", "1 full + 1 plan + 2 height"],
-)
-def test_the_least_that_is_enough(use: dict[str, str]) -> None:
-    one = case(use)
-    found = one.orient()
-    assert np.abs(one.errors(found)).max() < 1e-6
-    assert found.redundancy == 0
-    assert np.isnan(found.sigma0)
-
-
 def test_weights_add_the_strip_to_the_control() -> None:
     control = control_points(GROUND, {"A": "xy", "B": "z"}, sigma=np.array([0.03, 0.04, 0.12]))
     weight = weights(control, PointPrecision(0.04, 0.05))
@@ -220,12 +203,6 @@ def test_too_little_control_is_counted(use: dict[str, str], counts: str) -> None
     assert error.code == "too-little-control"
     assert counts in str(error)
     assert "at least 2 control points in plan and 3 in height" in str(error)
-
-
-def test_two_full_points_leave_the_rotation_about_their_line() -> None:
-    error = refusal({"A": "xyz", "G": "xyz"})
-    assert error.code == "too-little-control"
-    assert "the rotation about the line of control points A and G stays free" in str(error)
 
 
 @pytest.mark.parametrize(

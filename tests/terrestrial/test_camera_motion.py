@@ -72,15 +72,6 @@ def test_a_turn_comes_back(right: float, up: float, roll: float, missing: int | 
     assert found.dof == (14 if missing is None else 7) - 3
 
 
-@pytest.mark.parametrize(
-    ("points", "column", "determined"), [(2, None, True), (1, None, False), (3, 1, True), (2, 1, False)]
-)
-def test_how_many_points_a_turn_needs(points: int, column: int | None, determined: bool) -> None:
-    given_ = pair((1e-3, 1e-3, 1e-3), places=PLACES[:points])
-    found = fit(given_ if column is None else without(given_, column), np.ones(points, bool))
-    assert (found is not None) == determined
-
-
 @pytest.mark.slow
 def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
     turn, draws = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 16 * PLACES.size  # in two epochs: eight blocks

@@ -155,14 +155,3 @@ def test_without_stable_points_nobody_can_know_of_the_cameras() -> None:
     result = run(replace(world(), stable=0))
     assert [note.code for note in result.notes] == ["no-stable-points"]
     assert all(state.turn is None for state in nonempty(result.cameras))
-
-
-def test_a_wrong_measurement_shows_in_the_vertical_parallax() -> None:
-    truth = world(moving=0)
-    series = truth.measure(1)
-    coordinates = series.coordinates.copy()
-    coordinates[1, 25, 1] += 0.08
-    result = monitor(replace(series, coordinates=coordinates), truth.pair, MonitoringSettings())
-    (note,) = [note for note in result.notes if note.code == "parallax-change"]
-    assert note.points == ("P25",)
-    assert "standard deviations" in note.message

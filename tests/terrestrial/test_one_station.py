@@ -67,19 +67,6 @@ def test_displacements_come_back_whether_the_camera_turned_or_not(turn: tuple[fl
     assert found.turn.values == pytest.approx(np.array(turn) * ARCSECOND, abs=0.05 * ARCSECOND)
 
 
-def test_without_a_second_distance_the_part_along_the_ray_is_not_seen() -> None:
-    measured = world(MOVED)
-    found = one_station(across_only(measured), F, ROTATION)
-    assert found.components == (2,) * 6
-    columns = attitude(*LOOK)
-    for row in (4, 5):
-        ray = columns @ np.array([IMAGE[row, 0], F, IMAGE[row, 1]])
-        ray /= np.linalg.norm(ray)
-        seen = MOVED[row] - (MOVED[row] @ ray) * ray
-        assert found.values[row] == pytest.approx(seen, abs=2e-4)  # on the sphere, and at the old distance
-        assert abs(found.values[row] @ ray) < 2e-4
-
-
 def drawn(count: int, *, complete: bool) -> tuple[Floats, Floats, Floats]:
     """Displacements, test values and standard deviations of models in which nothing moved."""
     exact, rng = world(np.zeros((6, 3)), (40.0, -25.0, 90.0)), np.random.default_rng(4)

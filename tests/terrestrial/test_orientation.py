@@ -229,34 +229,3 @@ def test_a_node_ahead_of_the_axes_is_taken_into_account(eccentricity: float) -> 
     assert np.abs(left_out.residuals).max() > 30 * ARCSECOND
     everything = orient(given_, F - 0.4, settings=OrientationSettings(EVERYTHING, eccentricity=eccentricity))
     assert everything.values[3:] == pytest.approx(np.array([F, *CENTRE]), abs=1e-7)
-
-
-def test_a_refraction_coefficient_is_found_or_given() -> None:
-    angles = (0.4, 0.08, -0.02)
-    given_ = from_the_theodolite(angles, 0.12, refraction=0.7)
-    found = orient(given_, F, CENTRE, OrientationSettings(("refraction",), eccentricity=0.12))
-    assert found.names[-1] == "k"
-    assert found.values == pytest.approx(np.array([*angles, 0.7]), abs=1e-8)
-    assert found.refraction == pytest.approx(0.7)
-    fixed = orient(given_, F, CENTRE, OrientationSettings(eccentricity=0.12, refraction=0.7))
-    assert fixed.values == pytest.approx(np.array(angles), abs=1e-11)
-
-
-@pytest.mark.parametrize(
-    ("settings", "distances", "message"),
-    [
-        (
-            OrientationSettings(eccentricity=0.1),
-            np.nan,
-            "eccentricity acts according to the distance .* P0 and 10 more",
-        ),
-        (OrientationSettings(("refraction",)), np.nan, "refraction acts according to the distance"),
-        (OrientationSettings(eccentricity=9.0), 15.0, "is it in metres"),
-    ],
-)
-def test_what_distances_do_not_determine_is_refused(
-    settings: OrientationSettings, distances: float, message: str
-) -> None:
-    given_ = replace(sightings((0.4, 0.0, 0.0)), distances=np.full(len(PLACES), distances))
-    with pytest.raises(GeometryError, match=message):
-        orient(given_, F, CENTRE, settings)

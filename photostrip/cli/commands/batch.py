@@ -25,7 +25,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
         int | None, typer.Option("--jobs", "-j", min=1, metavar="N", help="Number of processes; default: one per core.")
     ] = None,
     executor: Annotated[
-        str, typer.Option(metavar="WHERE", help="local, dask:local, or dask:tcp://HOST:PORT, a running cluster.")
+        str, typer.Option(metavar="WHERE", help="local, or dask:tcp://HOST:PORT, a running cluster.")
     ] = "local",
     assignments: Assignments = None,
     force: Annotated[bool, typer.Option("--force", help="Compute again what has not changed, too.")] = False,
@@ -39,7 +39,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = None,
     form: Annotated[
         BatchFormat, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the summary is printed.")
-    ] = BatchFormat.TEXT,
+    ] = "text",
     width: Width = None,
     depfile: Rule = None,
     html: Annotated[

@@ -9,13 +9,12 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
-from photostrip.cli.stdout import Format
 
 
 def check(
     projects: Annotated[list[Path], typer.Argument(metavar="PROJECT...", help="Project files (YAML).")],
     assignments: Assignments = None,
-    form: Shape = Format.TEXT,
+    form: Shape = "text",
     width: Width = None,
     quiet: Quiet = False,
     verbose: Verbose = False,

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from photostrip.cli.options import Quiet, Verbose, Width
-from photostrip.cli.stdout import CompareFormat, Format, print_json, print_sections
+from photostrip.cli.stdout import CompareFormat, print_json, print_sections
 
 
 def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
@@ -38,7 +38,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = None,
     form: Annotated[
         CompareFormat, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed.")
-    ] = CompareFormat.TEXT,
+    ] = "text",
     width: Width = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -64,7 +64,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
     if (baseline is None) is not again or (update and again) or (project is not None and not again):
         message = "give a BASELINE, or --again without one (and with it alone --project)"
         raise typer.BadParameter(message, param_hint="BASELINE")
-    with failures_as(Format.TEXT if form is CompareFormat.JUNIT else Format(form.value)):
+    with failures_as(form):
         allowed = None if tolerances is None else load_tolerances(tolerances)[0]
         if baseline is None:
             found = compare_again(result, project, allowed)
@@ -75,7 +75,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
         else:
             with baseline_job.told_how_to_write(baseline):
                 found = compared(result, baseline, tolerances=allowed).document
-        if TRUTH in found and form in {CompareFormat.JUNIT, CompareFormat.GITHUB}:
+        if TRUTH in found and form in {"junit", "github"}:
             message = "true errors have no tolerances that a test could keep: text, md or json"
             raise typer.BadParameter(message, param_hint="--format")
         _print(found, form, width, quiet=quiet, verbose=verbose)
@@ -91,14 +91,14 @@ def _print(found: dict[str, Any], form: CompareFormat, width: int | None, *, qui
     from photostrip.report.page.messages import annotated
 
     match form:
-        case CompareFormat.JSON:
+        case "json":
             print_json(found)
-        case CompareFormat.JUNIT:
+        case "junit":
             sys.stdout.write(
                 to_junit(f"photostrip compare {found.get('name') or found['result']}", compare_cases(found))
             )
-        case CompareFormat.GITHUB:
+        case "github":
             sys.stdout.write(annotated(compare_findings(found, lambda file: line_finder(text_of(file)))))
-        case CompareFormat.TEXT | CompareFormat.MD:
+        case "text" | "md":
             title, sections = comparison_report(found, quiet=quiet, everything=verbose)
-            print_sections(title, sections, width, markdown=form is CompareFormat.MD)
+            print_sections(title, sections, width, markdown=form == "md")

@@ -14,7 +14,7 @@ from photostrip.cli.stdout import Format
 def info(
     form: Annotated[
         Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed: text or json.")
-    ] = Format.TEXT,
+    ] = "text",
 ) -> None:
     """Print versions and formats, and how to get what is missing.
 
@@ -23,7 +23,7 @@ def info(
     from photostrip.cli.jobs.installation import as_text, installation
 
     found = installation()
-    if form is Format.JSON:
+    if form == "json":
         import json
 
         typer.echo(json.dumps(found, indent=1))

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Plots, Quiet, Saved, Strict, Target, Width
-from photostrip.cli.section_option import Sections, Verbose, refuse_sections
+from photostrip.cli.options import Plots, Quiet, Saved, Sections, Strict, Target, Verbose, Width, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result, report_text
 
 HTML = ".html"
@@ -40,7 +39,7 @@ def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.result.verdict import exit_code
 
     page = output is not None and form is None and output.suffix.lower() == HTML
-    wanted = form or (form_of(output) if output is not None and not page else Format.TEXT)
+    wanted = form or (form_of(output) if output is not None and not page else "text")
     parts = Parts(quiet, verbose, section or ())
     refuse_sections(section, "HTML" if page else wanted)
     file = str(result / "result.json" if result.is_dir() else result)

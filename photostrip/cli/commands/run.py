@@ -8,9 +8,20 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Plots, Quiet, Rule, Shape, Strict, Width, require_target
-from photostrip.cli.section_option import Sections, Verbose, refuse_sections
-from photostrip.cli.stdout import Format, Parts, form_of, print_result
+from photostrip.cli.options import (
+    Assignments,
+    Plots,
+    Quiet,
+    Rule,
+    Sections,
+    Shape,
+    Strict,
+    Verbose,
+    Width,
+    refuse_sections,
+    require_target,
+)
+from photostrip.cli.stdout import Parts, form_of, print_result
 
 
 def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
@@ -19,7 +30,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the result into.")
     ] = None,
     assignments: Assignments = None,
-    form: Shape = Format.TEXT,
+    form: Shape = "text",
     width: Width = None,
     depfile: Rule = None,
     trace: Annotated[
@@ -46,7 +57,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     The report goes to stdout, in at most 120 lines; --verbose prints all of it, --section a part. With -o, DIR gets
     result.json with everything, the tables points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv and
     refined.csv, and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also
-    when it is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With
+    when it is LOOK or UNVERIFIED. With
     --compare-methods and -o, each method gets a folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as
@@ -81,7 +92,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         waiting.at("writing the result")
         files_read = read.files_read(result)
         if trace is not None:
-            write_text(trace, result.trace(form_of(trace, "--trace").value), files_read)
+            write_text(trace, result.trace(form_of(trace, "--trace")), files_read)
         if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
             write_text(depfile, make_rule(output / RESULT, files_read), files_read)
         if output is not None:

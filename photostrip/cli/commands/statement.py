@@ -43,7 +43,7 @@ def statement(
     from photostrip.result.statement.accuracy_statement import exit_code, statement_document
 
     page = output is not None and form is None and output.suffix.lower() == HTML
-    wanted = Format(form.value) if form else form_of(output) if output is not None and not page else Format.TEXT
+    wanted = form or (form_of(output) if output is not None and not page else "text")
     given = {"plan": class_plan, "height": class_height}
     file = str(result / "result.json" if result.is_dir() else result)
     with failures_as(wanted):
@@ -53,12 +53,12 @@ def statement(
             from photostrip.formats.text.writing import write_text
 
             write_text(output, _page(found) if page else _text(found, wanted, width, quiet=quiet))
-        elif wanted is Format.JSON:
+        elif wanted == "json":
             print_json(found)
         else:
             from photostrip.report.statements.statement import statement_report
 
-            print_sections(*statement_report(found, quiet=quiet), width, markdown=wanted is Format.MD)
+            print_sections(*statement_report(found, quiet=quiet), width, markdown=wanted == "md")
     return exit_code(found["status"])
 
 
@@ -75,11 +75,11 @@ def _text(found: Document, form: Format, width: int | None, *, quiet: bool) -> s
     from photostrip.report.page import layout, text
     from photostrip.report.statements.statement import statement_report
 
-    if form is Format.JSON:
+    if form == "json":
         from photostrip.formats.output.result_json import to_json
 
         return to_json(found)
     title, sections = statement_report(found, quiet=quiet)
-    if form is Format.MD:
+    if form == "md":
         return text.to_markdown(title, sections)
     return text.to_text(title, sections, width or layout.USUAL)

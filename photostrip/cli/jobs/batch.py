@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip import __version__
-from photostrip.batch.local_pool import Executor, LocalPool
+from photostrip.batch.pool import Executor, LocalPool
 from photostrip.batch.result_folder import ResultFolder, opened
-from photostrip.batch.run import Batch, Run, Stop, on_signals
+from photostrip.batch.run import Run, Stop, on_signals
 from photostrip.batch.selection import choose
-from photostrip.batch.tasks import Answer, Limits, Task
+from photostrip.batch.tasks import Answer, Limits
 from photostrip.cli.failures import as_fault, failures_as
-from photostrip.cli.stdout import BatchFormat, Document, Format, ascii_only, print_sections
+from photostrip.cli.stdout import BatchFormat, Document, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
 from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
-from photostrip.report.page.progress import BatchTable, batch_table
+from photostrip.report.page.progress import BatchProgress, batch_progress
 from photostrip.visible import visible, visible_json
 
 EXIT_SIGNAL = 128  # plus its number, as a shell reports it
@@ -55,49 +54,41 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
     stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))
-        with failures_as(Format(form.value) if form.value in set(Format) else Format.TEXT):
+        with failures_as(form):
             projects = choose(options.projects)
             if options.output is not None:
                 folder = stack.enter_context(opened(options.output, options.overrides))
-        table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
+        progress = stack.enter_context(batch_progress(sys.stderr, len(projects), quiet=quiet))
         run = Run(projects, options.overrides, folder, force=options.force, strict=options.strict, html=options.html)
         trouble: list[PhotostripError] = []
         try:
-            with executor_of(options, len(projects), table) as executor:
-                run.go(executor, BatchMessages(table, len(projects), quiet=quiet, verbose=verbose).finished, stop)
+            with executor_of(options, len(projects), progress) as executor:
+                said = BatchMessages(progress, len(projects), quiet=quiet, verbose=verbose)
+                run.go(executor, said.finished, stop, lambda task: progress.begun(task.project))
         except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:
-            table.stop()
-            code = max((run.batch.exit_code, *(each.exit_code for each in trouble)))
+            progress.stop()
+            code = max((run.exit_code, *(each.exit_code for each in trouble)))
             code = EXIT_SIGNAL + stop.signal if stop.signal else code
             if folder is not None:
-                trouble += write_summaries(run.batch, code, folder, html=options.html)
-    print_summary(run.batch.outcomes, code, form, width, quiet=quiet, verbose=verbose)
+                trouble += write_summaries(run, code, folder, html=options.html)
+    print_summary(run.outcomes, code, form, width, quiet=quiet, verbose=verbose)
     if options.depfile is not None and options.output is not None:
         write_text(options.depfile, make_rule(options.output / "summary.json", run.files_read()))
-    _say_end(run.batch, stop, quiet=quiet)
+    _say_end(run, stop, quiet=quiet)
     for each in trouble:
         raise each
     return code
 
 
-@contextmanager
-def executor_of(options: BatchOptions, number: int, table: BatchTable) -> Iterator[Executor]:
+def executor_of(options: BatchOptions, number: int, progress: BatchProgress) -> AbstractContextManager[Executor]:
     """Start the pool of this machine, or connect to the cluster that the user named."""
-    jobs = min(options.jobs or cores(), number)
-
-    def begun(task: Task) -> None:
-        table.begun(task.project)
-
     if options.executor == "local":
-        with LocalPool(jobs, options.limits, begun=begun) as pool:
-            yield pool
-        return
+        return LocalPool(min(options.jobs or cores(), number), options.limits)
     from photostrip.batch.cluster import cluster
 
-    with cluster(options.executor.removeprefix("dask:"), jobs, options.limits, begun, say=table.say) as found:
-        yield found
+    return cluster(options.executor.removeprefix("dask:"), options.limits, progress.say)
 
 
 class BatchMessages:
@@ -106,37 +97,37 @@ class BatchMessages:
     Verbose messages say also where internal errors happened.
     """
 
-    def __init__(self, table: BatchTable, total: int, *, quiet: bool, verbose: bool) -> None:
-        self.table, self.total, self.quiet, self.verbose, self.done = table, total, quiet, verbose, 0
+    def __init__(self, progress: BatchProgress, total: int, *, quiet: bool, verbose: bool) -> None:
+        self.progress, self.total, self.quiet, self.verbose, self.done = progress, total, quiet, verbose, 0
 
     def finished(self, outcome: Document, answer: Answer | None) -> None:
         """Say what became of a project."""
         self.done += 1
-        self.table.finished(outcome["project"], failed=bool(outcome["exit_code"]), unchanged=answer is None)
-        if self.quiet or (self.table.live and not outcome["exit_code"]):
+        self.progress.finished(outcome["project"])
+        if self.quiet or (self.progress.live and not outcome["exit_code"]):
             return
         how = ", unchanged" if answer is None and not outcome["exit_code"] else ""
         trace = answer.trace if answer is not None and self.verbose else ""
         count = f"{self.done:>{len(str(self.total))}} of {self.total}"
-        self.table.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
+        self.progress.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
 
 
-def write_summaries(batch: Batch, code: int, folder: ResultFolder, *, html: bool = False) -> list[InputError]:
+def write_summaries(run: Run, code: int, folder: ResultFolder, *, html: bool = False) -> list[InputError]:
     """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
     pages = {}
     if html:
         from photostrip.report.html import batch_html
 
-        pages["summary.html"] = batch_html(batch.outcomes, __version__)
+        pages["summary.html"] = batch_html(run.outcomes, __version__)
     try:
         write_files(
             folder.path,
             {
-                "summary.txt": text.to_text("", batch_sections(batch.outcomes, everything=True)),
-                "summary.csv": formats.summary_csv(batch.outcomes),
+                "summary.txt": text.to_text("", batch_sections(run.outcomes, everything=True)),
+                "summary.csv": formats.summary_csv(run.outcomes),
                 **pages,
-                "junit.xml": batch_junit(batch.outcomes),
-                "summary.json": formats.summary_json(batch.outcomes, code),
+                "junit.xml": batch_junit(run.outcomes),
+                "summary.json": formats.summary_json(run.outcomes, code),
             },
         )
     except InputError as error:
@@ -150,29 +141,29 @@ def print_summary(
     outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
     match form:
-        case BatchFormat.CSV:
+        case "csv":
             sys.stdout.write(visible(formats.summary_csv(outcomes)))
-        case BatchFormat.JSON:
+        case "json":
             sys.stdout.write(visible_json(formats.summary_json(outcomes, code, ascii_only=ascii_only())))
-        case BatchFormat.JUNIT:
+        case "junit":
             sys.stdout.write(batch_junit(outcomes))
-        case BatchFormat.GITHUB:
+        case "github":
             sys.stdout.write(messages.annotated(finding for each in outcomes for finding in each["findings"]))
-        case BatchFormat.TEXT | BatchFormat.MD:
+        case "text" | "md":
             sections = batch_sections(outcomes, quiet=quiet, everything=verbose)
-            markdown = form is BatchFormat.MD
+            markdown = form == "md"
             print_sections("Summary of the batch" if markdown else "", sections, width, markdown=markdown)
 
 
-def _say_end(batch: Batch, stop: Stop, *, quiet: bool) -> None:
+def _say_end(run: Run, stop: Stop, *, quiet: bool) -> None:
     """Say on stderr what was computed, and why the batch ended before its end."""
-    waiting = sum(each["status"] == "not run" for each in batch.outcomes)
+    waiting = sum(each["status"] == "not run" for each in run.outcomes)
     if stop.signal:
         sys.stderr.write(f"interrupted: {counted(waiting, 'project')} not run; the same command goes on from here\n")
     elif stop():
         sys.stderr.write(
             f"error: {stop.refusals} results in a row could not be written; {counted(waiting, 'project')} not run\n"
         )
-    elif not quiet and batch.unchanged:
-        computed = len(batch.outcomes) - batch.unchanged
-        sys.stderr.write(f"{computed} computed, {batch.unchanged} unchanged since the last time\n")
+    elif not quiet and run.unchanged:
+        computed = len(run.outcomes) - run.unchanged
+        sys.stderr.write(f"{computed} computed, {run.unchanged} unchanged since the last time\n")

@@ -20,10 +20,10 @@ SCHEMA = 1
 
 def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
     """Print what was found in some projects, in the order in which the user named them."""
-    if form is Format.JSON:
+    if form == "json":
         text = json.dumps(document_of(found), ensure_ascii=ascii_only(), indent=1)
         sys.stdout.write(f"{visible_json(text)}\n")
-    elif form is Format.GITHUB:
+    elif form == "github":
         sys.stdout.write(messages.annotated(finding for each in found for finding in findings_of(each)))
     else:
         for number, each in enumerate(found):
@@ -59,7 +59,7 @@ def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool
     head = verdict(checked.path, checked.wrong, checked.remarks)
     lines = messages.lines_of(findings)
     sections = () if quiet or not checked.document else check_sections(checked.document, everything=verbose)
-    if form is Format.MD:
+    if form == "md":
         marked = "".join(f"- {line}\n" for line in lines)
         page = to_markdown("", sections) if sections else ""
         sys.stdout.write(visible(f"# {head}\n\n{marked}\n{page}"))

@@ -58,11 +58,11 @@ def compare_methods(
             from photostrip.report.html import methods_html
 
             write_text(output / "methods.html", methods_html(document))
-    if form is Format.JSON:
+    if form == "json":
         print_json(document)
     else:
         title = f"Methods: {document['name']}"
-        print_sections(title, methods_sections(document), width, markdown=form is not Format.TEXT)
+        print_sections(title, methods_sections(document), width, markdown=form != "text")
     return EXIT_DONE
 
 

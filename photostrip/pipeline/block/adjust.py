@@ -10,7 +10,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.network import defects, reliability, self_calibration, snooping
+from photostrip.network import defects, reliability, snooping
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
 from photostrip.network.cofactors import Correlation, correlations
 from photostrip.network.cofactors import cofactors_of as precision_of
@@ -178,7 +178,7 @@ def _name_undetermined(block: BlockProblem, error: GeometryError) -> None:
     sigma = problem.cameras.sigma
     if sigma is None or not np.isinf(sigma).any():
         return
-    loose = np.where(np.isinf(sigma), self_calibration.millimetre(problem.images.xy), sigma)
+    loose = np.where(np.isinf(sigma), reliability.millimetre(problem.images.xy), sigma)
     held = replace(problem, cameras=replace(problem.cameras, sigma=loose))
     try:
         solution = solve(selected(held, supported(held, block.begin)))
@@ -189,7 +189,7 @@ def _name_undetermined(block: BlockProblem, error: GeometryError) -> None:
     kept = np.sqrt(np.diag(cofactors.common)[: len(prior)]) / prior
     free = np.isinf(sigma)[sigma > 0.0]
     names = held.common_names()
-    lost = [names[row] for row in np.flatnonzero(free & (kept > self_calibration.KEPT))]
+    lost = [names[row] for row in np.flatnonzero(free & (kept > reliability.KEPT))]
     if not lost:
         return
     partner = next((each for each in correlations(solution, cofactors) if lost[0] in {each.first, each.second}), None)
@@ -290,7 +290,7 @@ def _bundle(inputs: Inputs, settings: Settings, start: BlockStart, estimated: _E
     """Collect the results of the adjustment."""
     block, screened = estimated.block, estimated.screened
     problem, solution, precision = screened.problem, screened.solution, screened.precision
-    parameters = self_calibration.parameters_of(problem, solution, precision)
+    parameters = reliability.parameters_of(problem, solution, precision)
     correlations = _correlations(solution, precision)
     unit = solution.sigma0 if settings.bundle.test == "tau" and solution.redundancy > 0 else 1.0
     single = [strip for strip in inputs.strips if len(strip.photos) == 1]
@@ -344,7 +344,7 @@ def _correlations(solution: BundleSolution, cofactors: Cofactors) -> tuple[Corre
 def _refuse_inseparable(found: Sequence[Correlation], common: set[str]) -> None:
     """Refuse parameters that cannot be told apart from others."""
     for each in found:
-        if {each.first, each.second} & common and abs(each.value) > self_calibration.INSEPARABLE:
+        if {each.first, each.second} & common and abs(each.value) > reliability.INSEPARABLE:
             message = (
                 f"{each.first} cannot be told apart from {each.second} (correlation {each.value:.6f}): take it out of "
                 "self_calibration, or give it a calibration_sigma"

@@ -9,10 +9,9 @@ import numpy as np
 
 from photostrip.arrays import Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.network import defects, hypotheses, reliability, self_calibration
+from photostrip.network import defects, hypotheses, reliability
 from photostrip.network.cofactors import coordinates_of, joint_cofactors
-from photostrip.network.problem import BundleProblem
-from photostrip.network.settings import CALIBRATION
+from photostrip.network.problem import CALIBRATION, BundleProblem
 from photostrip.notes import Note
 from photostrip.pipeline.common_points import in_output
 from photostrip.pipeline.given_points import axes_of, compare_with_given
@@ -166,7 +165,7 @@ def _calibrated(observations: PhotoPoints, bundle: Bundle) -> PhotoPoints:
     if not len(bundle.screened.solution.common):
         return observations
     photo = bundle.start.rows_of(observations.photo_ids)[observations.photo]
-    shift = self_calibration.image_shift(problem, bundle.screened.solution.common, observations.xy, photo)
+    shift = reliability.image_shift(problem, bundle.screened.solution.common, observations.xy, photo)
     return replace(observations, xy=observations.xy + shift)
 
 

@@ -14,6 +14,7 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import from_angles
 from photostrip.network.adjustment import Selection
 from photostrip.network.problem import (
+    ASKED,
     AttitudeObservations,
     BundleCameras,
     BundleProblem,
@@ -22,14 +23,13 @@ from photostrip.network.problem import (
     PositionObservations,
     StartValues,
 )
-from photostrip.network.self_calibration import sigmas
-from photostrip.network.settings import ASKED
+from photostrip.network.reliability import sigmas
 from photostrip.pipeline import overruling
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
 from photostrip.pipeline.results import BlockProblem, BlockStart
 from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.strip.gross_errors.control_screening import majority
+from photostrip.strip.control_screening import majority
 from photostrip.strip.resection import KnownPhotos, project
 
 FAR_FROM_RAY = 5.0  # times the median: a ray of no pair that misses its point by more waits outside at first

@@ -51,7 +51,7 @@ from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.ids import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
-from photostrip.strip.gross_errors.control_screening import majority
+from photostrip.strip.control_screening import majority
 from photostrip.strip.ray_intersection import intersect_points
 from photostrip.strip.resection import LEAST_POINTS, KnownPhotos, approximate, project, resect
 

@@ -17,12 +17,12 @@ from photostrip.notes import Finding
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.pipeline.plausibility import evidence
+from photostrip.pipeline.plausibility.evidence import ImageEvidence
 from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
 from photostrip.pipeline.strips.models import LinkedModels, link_strip
 from photostrip.plausibility import given_points
 from photostrip.points import ControlPoints, concatenated
-from photostrip.strip.independent_models.formation import FormedModels
+from photostrip.strip.model_strip import FormedModels
 
 UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
 

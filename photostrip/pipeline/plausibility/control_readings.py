@@ -32,7 +32,7 @@ from photostrip.plausibility.slips import LIMIT
 from photostrip.plausibility.wrong_place import FOOT, KINDS_OF_FEET
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
-from photostrip.strip.gross_errors.control_search import ROUNDING
+from photostrip.strip.control_search import ROUNDING
 
 LEVEL = 1e-6  # of naming a reading where the control is read as it should be: a run fails because of it
 SEARCH_LEVEL = 0.01  # of taking anything out of sound control

@@ -23,8 +23,8 @@ from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
 from photostrip.pipeline.plausibility import control_layout, evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.control_readings import find_distance
+from photostrip.pipeline.plausibility.evidence import of_images, of_units
 from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.pipeline.plausibility.image_evidence import of_images, of_units
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import accepted, flight, flight_order, ids, units
 from photostrip.plausibility.ids import OrientedRays
@@ -329,7 +329,7 @@ def _shared_ids(each: FormedPhotos, observations: PhotoPoints) -> Iterator[Findi
 
 def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:
     """Rays of a bundle; those that it rejected did not go with the others."""
-    from photostrip.network.self_calibration import image_shift  # a strip needs nothing of a bundle
+    from photostrip.network.reliability import image_shift
 
     solution = bundle.screened.solution
     problem = replace(bundle.block.problem, cameras=bundle.screened.problem.cameras)  # with what was taken up

@@ -22,14 +22,14 @@ from photostrip.network.cofactors import coordinates_of, joint_cofactors
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.plausibility import evidence
-from photostrip.pipeline.strips import models, photos_on_control
+from photostrip.pipeline.strips import absolute, models
 from photostrip.pipeline.strips.absolute import OrientedStrip, strip_at_control
 from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.given_points import far_away
 from photostrip.points import ControlPoints
-from photostrip.strip.gross_errors.control_screening import BENT, FoundErrors, first_search, kept_of, majority, search
-from photostrip.strip.gross_errors.control_search import JointAdjustment, StripAtControl, adjust
+from photostrip.strip.control_screening import BENT, FoundErrors, first_search, kept_of, majority, search
+from photostrip.strip.control_search import JointAdjustment, StripAtControl, adjust
 
 MOST_POINTS = 60  # control points that are looked at together: of more some are drawn, evenly along the strip
 AS_FORMED = Similarity(1.0, np.eye(3), np.zeros(3))
@@ -176,7 +176,7 @@ class HeldStrip:
         self, control: ControlPoints, frames: Sequence[GroundFrame]
     ) -> tuple[FormedPhotos | LinkedModels, OrientedStrip]:
         if isinstance(self.stage, FormedPhotos):
-            photos = photos_on_control.orient_on_control(self.stage, control, frames, self.settings.absolute)
+            photos = absolute.orient_on_control(self.stage, control, frames, self.settings.absolute)
             return photos.stage, photos.oriented
         linked = models.orient_on_control(self.stage, control, frames, self.settings.absolute)
         return linked.linked, linked.oriented

@@ -36,9 +36,8 @@ from photostrip.network.hypotheses import (
     Hypothesis,
 )
 from photostrip.network.observations import drift_columns
-from photostrip.network.reliability import CONTROL
-from photostrip.network.self_calibration import Parameter
-from photostrip.network.settings import CALIBRATION
+from photostrip.network.problem import CALIBRATION
+from photostrip.network.reliability import CONTROL, Parameter
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.plausibility.on_control import OnControl

@@ -2,6 +2,6 @@
 
 What comes in are ideal image coordinates (``photos``) or model coordinates (``models``), what goes out is a
 ``results.StripResult``. ``finding`` finds strips among photos in no order, ``method`` forms all strips and corrects
-their deformation ([001] eq. 150-152); ``absolute`` lays a formed strip on its control ([001] eq. 142-149),
-``photos_on_control`` and ``models`` take wrong control out. ``notes`` say what stands beside the numbers.
+their deformation ([001] eq. 150-152); ``absolute`` lays a formed strip on its control ([001] eq. 142-149);
+``models`` and it take wrong control out. ``notes`` say what stands beside the numbers.
 """

@@ -22,7 +22,7 @@ from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.plausibility import mosaic
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import corrections
+from photostrip.strip import corrections
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 
 AHEAD = float(np.cos(np.pi / 4))

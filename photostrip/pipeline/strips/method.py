@@ -14,11 +14,10 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import SIMILARITY, Inputs, Settings, Strip
 from photostrip.pipeline.results import StripResult
-from photostrip.pipeline.strips import models, photos_on_control
-from photostrip.pipeline.strips.absolute import OrientedStrip
+from photostrip.pipeline.strips import absolute, models
+from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedPhotos
 from photostrip.pipeline.strips.models import LinkedModels, link_strip
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
-from photostrip.pipeline.strips.photos_on_control import ScreenedPhotos
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip import polynomial
 
@@ -77,7 +76,7 @@ def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError)
 
 def adjust_photos(screened: ScreenedPhotos, settings: Settings) -> StripResult:
     """Correct the deformation of a strip and orient its photos on the corrected points."""
-    return photos_on_control.adjusted(screened, _correction(screened.photos.oriented, settings), settings)
+    return absolute.adjusted(screened, _correction(screened.photos.oriented, settings), settings)
 
 
 def adjust_formed(
@@ -85,7 +84,7 @@ def adjust_formed(
 ) -> StripResult:
     """Lay a formed strip on its control and correct its deformation."""
     if isinstance(stage, FormedPhotos):
-        return adjust_photos(photos_on_control.on_control(stage, control, frames, settings), settings)
+        return adjust_photos(absolute.on_control(stage, control, frames, settings), settings)
     found = models.on_control(stage, control, frames, settings)
     return models.adjusted(found, _correction(found.models.oriented, settings))
 

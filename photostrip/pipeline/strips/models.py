@@ -23,11 +23,9 @@ from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, strip_at_control, to_ground
 from photostrip.pipeline.strips.notes import link_notes
 from photostrip.points import ControlPoints, ModelPoints, locate, take_rows
-from photostrip.strip import absolute_orientation
-from photostrip.strip.gross_errors import control_screening
-from photostrip.strip.independent_models import formation, linking
-from photostrip.strip.independent_models.formation import FormedModels, form_from_models, require_links
-from photostrip.strip.independent_models.linking import LinkSettings, ScreenedLinks, StripModels
+from photostrip.strip import absolute_orientation, control_screening, model_links, model_strip
+from photostrip.strip.model_links import LinkSettings, ScreenedLinks, StripModels
+from photostrip.strip.model_strip import FormedModels, form_from_models, require_links
 from photostrip.strip.polynomial import Polynomial
 from photostrip.units import MILLIMETRES
 
@@ -141,10 +139,10 @@ def _refuse_other_hand(oriented: OrientedStrip) -> None:
         return
     xyz = oriented.formed.xyz[oriented.control_rows]
     targets = oriented.targets.of(xyz)[full]
-    as_it_is, mirrored = linking.either_hand(xyz[full], targets)
+    as_it_is, mirrored = model_links.either_hand(xyz[full], targets)
     expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread.plan**2 + spread.height**2).sum()
-    conspicuous = as_it_is > linking.CONSPICUOUS * expected
-    if conspicuous and mirrored < linking.REFLECTED * as_it_is:
+    conspicuous = as_it_is > model_links.CONSPICUOUS * expected
+    if conspicuous and mirrored < model_links.REFLECTED * as_it_is:
         raise _left_handed(oriented.strip)
 
 
@@ -212,7 +210,7 @@ def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> 
             point_ids=tuple(map(measured.name, range(len(nodes)))),
         )
     )
-    adjusted = linking.Similarities(network.scales, network.rotations, network.centers)
+    adjusted = model_links.Similarities(network.scales, network.rotations, network.centers)
     formed = replace(
         formed,
         places=adjusted,
@@ -229,14 +227,14 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
     Raises GeometryError, InputError when a link cannot be determined, or models are mirror images of each other.
     """
     models = models_of(strip, measured, settings.links)
-    shared = linking.common(models)
+    shared = model_links.common(models)
     try:
         require_links(shared, models, np.ones(len(shared.link), bool), strip.models)
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, code=error.code) from error
     kept = rows_of_models(settings.links.keep, measured)[models.row]
-    links = linking.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
+    links = model_links.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
     _refuse_reflected(strip, links)
     photos = locate(strip.photos, measured.photo_ids)
     return form_from_models(models, links, np.where(photos < 0, -1, photos + len(measured.point_ids)))
@@ -247,7 +245,7 @@ def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) 
     place = locate(measured.model_ids, strip.models)[measured.model]
     rows = np.flatnonzero(place >= 0)
     rows = rows[np.lexsort((measured.node[rows], place[rows]))]
-    whole = linking.StripModels(
+    whole = model_links.StripModels(
         count=len(strip.models),
         points=len(measured.point_ids),
         row=rows,
@@ -301,7 +299,7 @@ def _centers(formed: FormedModels, similarity: Similarity, correction: Polynomia
     if correction is None or not known.any():
         return placed
     found, axes = placed[known], correction.axes
-    above = formation.heights_above(found, similarity(formed.xyz))
-    rows = formation.displacement_rows(found, above, [axis.terms for axis in axes])
+    above = model_strip.heights_above(found, similarity(formed.xyz))
+    rows = model_strip.displacement_rows(found, above, [axis.terms for axis in axes])
     placed[known] = found + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
     return placed

@@ -13,16 +13,16 @@ from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
-from photostrip.strip.gross_errors.control_screening import EITHER, EXCHANGED, ScreenedControl
-from photostrip.strip.gross_errors.pair_screening import ScreenedPairs
-from photostrip.strip.independent_models.formation import FormedModels, far_ends
-from photostrip.strip.independent_models.linking import LEFT
+from photostrip.strip.control_screening import EITHER, EXCHANGED, ScreenedControl
+from photostrip.strip.formed_strip import FormedStrip
+from photostrip.strip.model_links import LEFT
+from photostrip.strip.model_strip import FormedModels, far_ends
+from photostrip.strip.pair_screening import ScreenedPairs
 from photostrip.strip.polynomial import Polynomial
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.strip.resection import Resection
 from photostrip.strip.strip_errors import WEAK_PAIR, times_a_good_pair
-from photostrip.strip.strip_formation.strip import FormedStrip
 
 # of the length that the control spans: how far points may lie beyond it. Of a polynomial they are extrapolated
 BEYOND_POLYNOMIAL = 0.1

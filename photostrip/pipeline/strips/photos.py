@@ -21,8 +21,15 @@ from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages
 from photostrip.points import PhotoPoints
 from photostrip.rejection import SEVERAL_RAYS, Rejection
-from photostrip.strip import absolute_orientation, ray_intersection
-from photostrip.strip.gross_errors import pair_screening
+from photostrip.strip import absolute_orientation, pair_screening, ray_intersection
+from photostrip.strip.formed_strip import (
+    NOTHING_GIVEN,
+    FirstPhoto,
+    FormedStrip,
+    form_from_pairs,
+    without_points,
+    without_rows,
+)
 from photostrip.strip.relative_orientation.orientation import (
     Orientation,
     RelativeSettings,
@@ -31,16 +38,8 @@ from photostrip.strip.relative_orientation.orientation import (
     refuse_unusable,
 )
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs
+from photostrip.strip.scale_transfer import StripFormationSettings
 from photostrip.strip.strip_errors import StripErrors, differentiate_strip
-from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.strip.strip_formation.strip import (
-    NOTHING_GIVEN,
-    FirstPhoto,
-    FormedStrip,
-    form_from_pairs,
-    without_points,
-    without_rows,
-)
 
 
 class ScreenedFormation(NamedTuple):

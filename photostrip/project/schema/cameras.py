@@ -6,7 +6,7 @@ from pydantic import Discriminator, Tag
 
 from photostrip import camera
 from photostrip.errors import InputError
-from photostrip.network.settings import ASKED
+from photostrip.network.problem import ASKED
 from photostrip.project.schema.ground import Angles
 from photostrip.project.schema.sections import (
     Before,
@@ -28,9 +28,9 @@ from photostrip.project.schema.sections import (
     single,
     wrong,
 )
-from photostrip.strip.image_coordinates import pixel_cameras
-from photostrip.strip.image_coordinates.fiducial_marks import PLACES
-from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PIXEL_SIZE
+from photostrip.strip import pixel_cameras
+from photostrip.strip.fiducial_marks import PLACES
+from photostrip.strip.pixel_cameras import CONVENTIONS, PIXEL_SIZE
 
 Place = Annotated[str, choice(tuple(PLACES))]
 Parameter = Annotated[str, choice(ASKED)]

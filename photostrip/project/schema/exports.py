@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.sections import Text, text, wrong
-from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
+from photostrip.strip.pixel_cameras import CONVENTIONS
 
 GEOPACKAGE = "geopackage"
 ENDINGS = {

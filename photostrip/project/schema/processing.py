@@ -7,7 +7,7 @@ from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.network.settings import ASKED, SCREENINGS, TESTS
+from photostrip.network.problem import ASKED, SCREENINGS, TESTS
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
 from photostrip.project.schema.cameras import AUTO, SelfCalibration
 from photostrip.project.schema.sections import (
@@ -31,10 +31,10 @@ from photostrip.project.schema.sections import (
     rule,
     wrong,
 )
-from photostrip.strip.independent_models.linking import METHODS as LINK_METHODS
+from photostrip.strip.model_links import METHODS as LINK_METHODS
 from photostrip.strip.polynomial import DEGREES
 from photostrip.strip.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
-from photostrip.strip.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
+from photostrip.strip.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
 
 DEFAULTS = Settings()
 

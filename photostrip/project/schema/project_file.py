@@ -27,12 +27,6 @@ from photostrip.project.schema.sections import (
     wrong,
 )
 
-SCHEMA_NUMBER = 1
-_read_schema_number = schema_number("photostrip", SCHEMA_NUMBER)
-SchemaNumber = Annotated[
-    int, Read(lambda value: _read_schema_number(single(value, str(SCHEMA_NUMBER))), {"const": SCHEMA_NUMBER})
-]
-
 
 def _finding(value: object) -> str:
     """Read the code of a finding, alone or with the one id that it is accepted for."""
@@ -69,7 +63,7 @@ class ProjectFile(Section):
     All paths are relative to the file itself. All ids are text, quoted or not.
     """
 
-    photostrip: SchemaNumber = key("Number of this schema")
+    photostrip: Annotated[int, schema_number("photostrip")] = key("Number of this schema")
     name: Words | None = key("Name of the project; default: the file's name without its ending", None)
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     cameras: Annotated[dict[str, AnyCamera], length(1), Before(if_empty)] = key(

@@ -204,16 +204,16 @@ def _flag(value: object) -> bool:
     return word in TRUE
 
 
-def schema_number(name: str, number: int, kind: str = "") -> Callable[[object], int]:
-    """Check of the number of a schema, the value of the key `name`."""
+def schema_number(name: str, kind: str = "") -> Read:
+    """Read the number of a schema, the value of the key `name`, which is 1 of all of them."""
 
     def read(value: object) -> int:
-        if str(value) != str(number):
+        if single(value, "1") != "1":
             message = f"this version of photostrip does not read schema {shown(str(value))}{kind}"
-            raise wrong(message, code="schema-number", expected=f"{name}: {number}")
-        return number
+            raise wrong(message, code="schema-number", expected=f"{name}: 1")
+        return 1
 
-    return read
+    return Read(read, {"const": 1})
 
 
 def whole(value: object) -> int:

@@ -1,10 +1,10 @@
-"""What ``photostrip check`` prints of a project: contents, frames, standard deviations, rows that are not used."""
+"""What ``photostrip check`` prints of a project: contents, frames, standard deviations, rows that are used."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from photostrip.notes import MOST_NAMED, Document, counted, listed
+from photostrip.notes import Document, counted
 from photostrip.report.page.angles import UNITS, AngleUnit
 from photostrip.report.page.numbers import short
 from photostrip.report.page.parts import DASH, Facts, Section, Words
@@ -171,18 +171,13 @@ def _source(place: Document, *, line: bool = True) -> str:
 
 
 def _rows(rows: Sequence[Document], *, everything: bool) -> Section:
-    parts: list[Words] = []
-    whole = [table for table in rows if not table["unused"]]
+    whole = [table for table in rows if table["used"] == table["rows"]]
     silent = [] if everything else whole[TABLES_SHOWN:]
-    for table in rows:
-        if table in silent:
-            continue
-        head = f"{table['file']}: {table['used']} of {counted(table['rows'], 'row')} used"
-        parts.append(Words(head, "head" if table["unused"] else ""))
-        for each in table["unused"]:
-            ids = listed(each["ids"], len(each["ids"]) if everything else MOST_NAMED)
-            first = f"first in line {each['first_line']}"
-            parts.append(Words(f"{counted(each['rows'], 'row')}: {each['why']} ({first}): {ids}", mark="  -"))
+    parts = [
+        Words(f"{table['file']}: {table['used']} of {counted(table['rows'], 'row')} used")
+        for table in rows
+        if table not in silent
+    ]
     if silent:
         parts.append(Words(f"{counted(len(silent), 'more table')}: all rows used"))
     return Section("Rows of the tables", tuple(parts))

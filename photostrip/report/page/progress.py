@@ -1,7 +1,7 @@
 """A line on stderr while something takes long: what is being done, how far it is, for how many seconds.
 
 Only a person who waits at a terminal sees it. It appears after a second, is wiped away when the work is done, and
-never stands in a pipe, a file or the log of a job. A batch has a table instead, with a row for each process.
+never stands in a pipe, a file or the log of a job. A batch has a bar instead.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
+from photostrip.notes import listed
 from photostrip.report.page.layout import cells, cut
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
-    from rich.live import Live
-    from rich.table import Table
+    from rich.progress import Progress as RichProgress
 
 PATIENCE = 1.0  # seconds before anything is shown
 LOOK_EVERY = 0.2  # seconds between two looks
@@ -97,103 +97,56 @@ def progress(stream: TextIO, total: int = 0, *, quiet: bool = False) -> Iterator
         line.stop(worker)
 
 
-PROCESS_ROWS = 16  # processes shown in the table of a batch
-BAR = 30  # characters
-
-
-class BatchTable:
-    """The table of a batch on a terminal: how far it is, what is being computed and for how long.
-
-    Where there is no terminal it shows nothing, and what is said goes straight to the stream.
-    """
+class BatchProgress:
+    """How far a batch is, on a terminal; where there is none, what is said goes straight to the stream."""
 
     def __init__(self, stream: TextIO, total: int, *, live: bool) -> None:
         self.stream, self.total, self.live = stream, total, live
-        self.done = self.failed = self.unchanged = 0
-        self._begin = time.monotonic()
-        self._running: dict[str, float] = {}
-        self._lock = threading.Lock()
-        self._live: Live | None = None
-
-    def start(self) -> None:
-        if self.live:
+        self._running: dict[str, None] = {}
+        self._bar: RichProgress | None = None
+        if live:
             from rich.console import Console
-            from rich.live import Live
+            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+            from rich.progress import Progress as Bar
 
-            console = Console(file=self.stream, highlight=False, markup=False)
-            shown = Live(get_renderable=self.page, console=console, refresh_per_second=5, transient=True)
-            self._live = shown
-            shown.start()
+            columns = BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn()
+            console = Console(file=stream, highlight=False, markup=False)
+            names = TextColumn("{task.description}", markup=False)
+            self._bar = Bar(*columns, names, console=console, transient=True)
+            self._task = self._bar.add_task("", total=total)
+            self._bar.start()
 
     def stop(self) -> None:
-        if self._live is not None:
-            live, self._live = self._live, None
-            live.stop()
+        if self._bar is not None:
+            self._bar.stop()
 
     def begun(self, project: str) -> None:
         """Say that a project is being computed now."""
-        with self._lock:
-            self._running[project] = time.monotonic()
+        self._running[project] = None
+        self._update(0)
 
-    def finished(self, project: str, *, failed: bool, unchanged: bool) -> None:
-        with self._lock:
-            self._running.pop(project, None)
-            self.done += 1
-            self.failed += failed
-            self.unchanged += unchanged
+    def finished(self, project: str) -> None:
+        self._running.pop(project, None)
+        self._update(1)
+
+    def _update(self, steps: int) -> None:
+        if self._bar is not None:
+            self._bar.update(self._task, advance=steps, description=visible(listed(self._running)))
 
     def say(self, text: str) -> None:
-        """Say something, above the table where there is one."""
-        if self._live is not None:
-            self._live.console.print(visible(text), soft_wrap=True)
+        """Say something, above the bar where there is one."""
+        if self._bar is not None:
+            self._bar.console.print(visible(text), soft_wrap=True)
         else:
             self.stream.write(f"{visible(text)}\n")
             self.stream.flush()
 
-    def head(self, seconds: float) -> str:
-        """Return the first line after some seconds: how far the batch is, and how long it may still take."""
-        filled = BAR * self.done // max(self.total, 1)
-        parts = [f"{'#' * filled}{'.' * (BAR - filled)} {self.done} of {self.total}"]
-        parts += [f"{self.failed} failed"] if self.failed else []
-        parts += [f"{self.unchanged} unchanged"] if self.unchanged else []
-        computed = self.done - self.unchanged
-        if computed:
-            left = seconds / computed * (self.total - self.done)
-            parts.append(f"{clock(seconds)}, about {clock(left)} to go")
-        else:
-            parts.append(clock(seconds))
-        return ", ".join(parts)
-
-    def page(self) -> Table:
-        from rich.table import Table
-
-        now = time.monotonic()
-        with self._lock:
-            running = list(self._running.items())
-        page = Table.grid(padding=(0, 2))
-        page.title, page.title_justify, page.title_style = self.head(now - self._begin), "left", ""
-        page.add_column(justify="right")
-        page.add_column(no_wrap=True, overflow="ellipsis")
-        for project, begin in running[:PROCESS_ROWS]:
-            page.add_row(clock(now - begin), visible(project))
-        if len(running) > PROCESS_ROWS:
-            page.add_row("", f"and {len(running) - PROCESS_ROWS} more")
-        return page
-
-
-def clock(seconds: float) -> str:
-    """Return a time as ``1:02:03``, without hours when there are none."""
-    minutes, rest = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
-
 
 @contextmanager
-def batch_table(stream: TextIO, total: int, *, quiet: bool = False) -> Iterator[BatchTable]:
-    """Show the table of a batch while a block runs, where the stream is a terminal."""
-    table = BatchTable(stream, total, live=not quiet and wanted(stream, os.environ))
-    table.start()
+def batch_progress(stream: TextIO, total: int, *, quiet: bool = False) -> Iterator[BatchProgress]:
+    """Show how far a batch is while a block runs, where the stream is a terminal."""
+    shown = BatchProgress(stream, total, live=not quiet and wanted(stream, os.environ))
     try:
-        yield table
+        yield shown
     finally:
-        table.stop()
+        shown.stop()

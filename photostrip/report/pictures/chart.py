@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -122,9 +122,6 @@ class Marks:
         """Tell which of very many marks are drawn."""
         return math.ceil(max(len(self.at), self.number) / MOST_DOTS)
 
-    def entry(self, x: float, y: float) -> str:
-        return svg.mark((x + 8.0, y), self.shape, f"mark {self.kind}", "", 5.0)
-
 
 @dataclass(frozen=True)
 class Line:
@@ -136,9 +133,6 @@ class Line:
         known = self.at[np.isfinite(self.at).all(axis=1)]
         if len(known):
             yield svg.path(frame.places(known).tolist(), f"line {self.kind}")
-
-    def entry(self, x: float, y: float) -> str:
-        return svg.line((x - 8.0, y), (x + 16.0, y), f"line {self.kind}")
 
 
 @dataclass(frozen=True)
@@ -171,9 +165,6 @@ class Segments:
             hint = svg.titled(self.hints[row]) if self.hints else ""
             yield svg.element("path", hint, d=piece, kind=f"line {self.kind}")
 
-    def entry(self, x: float, y: float) -> str:
-        return svg.line((x - 8.0, y), (x + 16.0, y), f"line {self.kind}")
-
 
 @dataclass(frozen=True)
 class Areas:
@@ -194,9 +185,6 @@ class Areas:
         for hint, each in zip(self.hints, corners, strict=True):
             yield svg.polygon(each, self.kind, hint)
 
-    def entry(self, x: float, y: float) -> str:
-        return svg.mark((x + 8.0, y), "square", self.kind, "", 6.0)
-
 
 def box(x: Range, y: Range) -> Floats:
     return np.array([(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])])
@@ -215,7 +203,7 @@ class Names:
     at: Floats
     names: Sequence[str]
     beside: bool = True
-    words: str = field(default="", init=False)
+    words: str = ""
 
     def draw(self, frame: Frame) -> Iterator[str]:
         places = frame.places(self.at)
@@ -237,11 +225,18 @@ class Names:
                     yield svg.text((left, base), name, "id")
                     break
 
-    def entry(self, _x: float, _y: float) -> str:
-        return ""
-
 
 Layer = Marks | Line | Segments | Areas | Names
+
+
+def _entry(layer: Layer, x: float, y: float) -> str:
+    """Draw what stands before the words of a layer in the legend."""
+    if isinstance(layer, Marks):
+        return svg.mark((x + 8.0, y), layer.shape, f"mark {layer.kind}", "", 5.0)
+    if isinstance(layer, Areas):
+        return svg.mark((x + 8.0, y), "square", layer.kind, "", 6.0)
+    return svg.line((x - 8.0, y), (x + 16.0, y), "" if isinstance(layer, Names) else f"line {layer.kind}")
+
 
 # ------------------------------------------------------------------------------------------------------------- panels
 
@@ -261,17 +256,16 @@ class Panel:
 
     def framed(self, corner: svg.Point, width: float, height: float) -> Frame:
         at = np.concatenate([np.zeros((0, 2)), *(layer.at for layer in self.layers)])
-        x = self.x or (0.0, len(self.names) + 1.0) if self.names else self.x or span(at[:, 0], zero=False, room=0.02)
+        (left, top), bottom = corner, corner[1] + height
+        x = (0.5, len(self.names) + 0.5) if self.names else span(at[:, 0], zero=False, room=0.02)
+        lower = Axis(*(self.x or x), left, left + width, names=self.names)
+        if self.rows:  # from above
+            return Frame(lower, Axis(0.4, len(self.rows) + 0.6, top, bottom, names=self.rows))
+        y = self.y or span(at[:, 1])
         if self.log:
-            positive = at[:, 1][at[:, 1] > 0]
-            y = self.y or (float(positive.min(initial=np.inf)) * 0.8, float(positive.max(initial=0.0)) * 1.25)
-            y = y if y[0] < y[1] else (0.1, 1.0)
-        else:
-            y = self.y or ((len(self.rows) + 0.6, 0.4) if self.rows else span(at[:, 1]))
-        left, top = corner
-        low, high = min(y), max(y)
-        up = (top + height, top) if y[0] < y[1] else (top, top + height)
-        return Frame(Axis(*x, left, left + width, names=self.names), Axis(low, high, *up, self.log, self.rows))
+            positive = at[:, 1][at[:, 1] > 0] if (at[:, 1] > 0).any() else np.ones(1)
+            y = float(positive.min()) * 0.8, float(positive.max()) * 1.25
+        return Frame(lower, Axis(*y, bottom, top, self.log))
 
     def surround(self, frame: Frame) -> Iterator[str]:
         """Draw grid lines, numbers and names of the axes."""
@@ -394,11 +388,15 @@ def _legend(layers: Iterable[Layer], heading: str) -> tuple[list[str], float]:
     drawn, x, y = [], LEFT, 20.0
     if heading:
         drawn, y = [svg.text((MARGIN, y), heading, "title")], 44.0
-    for words, layer in {layer.words: layer for layer in reversed(list(layers)) if layer.words}.items().__reversed__():
+    entries: dict[str, Layer] = {}
+    for layer in layers:
+        entries.setdefault(layer.words, layer)
+    entries.pop("", None)
+    for words, layer in entries.items():
         wide = 44.0 + LETTER * len(words)
         if x + wide > WIDTH - 70.0 and x > LEFT:
             x, y = LEFT, y + 22.0
-        drawn += [layer.entry(x, y), svg.text((x + 22.0, y + 4.5), words)]
+        drawn += [_entry(layer, x, y), svg.text((x + 22.0, y + 4.5), words)]
         x += wide
     return drawn, y
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from photostrip.notes import counted
 from photostrip.report.pictures.chart import Areas, Floats, Layer, Map, Names, box, chart, ground_bar
-from photostrip.report.pictures.places import Plan, format_of, rays_of
+from photostrip.report.pictures.places import Plan, format_of, grouped, rays_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
@@ -30,11 +30,8 @@ def footprints(plan: Plan) -> dict[str, Floats]:
     What looks at the sky or hardly down is cut off; a photo that shows nothing else, or has no points, has none.
     """
     cameras, rays = cameras_of(plan.document), rays_of(plan.document)
-    rows = plan.rows(rays.point)
-    seen: dict[str, list[int]] = {}
-    for photo, row in zip(rays.photo, rows.tolist(), strict=True):
-        if row >= 0:
-            seen.setdefault(photo, []).append(row)
+    rows = plan.rows(rays.point).tolist()
+    seen = grouped(pair for pair in zip(rays.photo, rows, strict=True) if pair[1] >= 0)
     outlines = {}
     for photo, own in seen.items():
         camera, n = cameras.get(photo), plan.photo_row.get(photo, -1)

@@ -32,6 +32,14 @@ def numbers(rows: Sequence[Document], *keys: str) -> Floats:
     return np.array(cells, np.float64).reshape(len(rows), len(keys))
 
 
+def grouped(pairs: Iterable[tuple[str, int]]) -> dict[str, list[int]]:
+    """Return the numbers that go with each name, in the order of the names."""
+    groups: dict[str, list[int]] = {}
+    for name, number in pairs:
+        groups.setdefault(name, []).append(number)
+    return groups
+
+
 class Rays(NamedTuple):
     """Image residuals, a row for each."""
 
@@ -184,16 +192,9 @@ def _shifts(frame: Document, given: Sequence[Document], order: list[int], turn: 
     return np.column_stack([shift[:, :2], numbers(given, "height")])
 
 
-class Format(NamedTuple):
-    """What a camera's photo holds around its principal point, mm."""
-
-    low: Floats
-    high: Floats
-
-
-def format_of(camera: Document) -> Format | None:
-    """Return the format of a camera; None where it is not known."""
+def format_of(camera: Document) -> tuple[Floats, Floats] | None:
+    """Return two corners of a photo from its principal point, mm; None where the camera's format is not known."""
     if not camera["format_mm"]:
         return None
     half, principal = np.array(camera["format_mm"]) / 2, np.array(camera["principal_point_mm"] or (0.0, 0.0))
-    return Format(-half - principal, half - principal)
+    return -half - principal, half - principal

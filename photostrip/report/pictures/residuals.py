@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from statistics import NormalDist, median
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from photostrip.report.pictures.chart import (
     chart,
     nice,
 )  # fmt: skip
-from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, rays_of
+from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, grouped, rays_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
@@ -66,44 +67,47 @@ def _longer(extent: tuple[Range, Range]) -> float:
 
 def _scale(v: Floats, longest: float) -> tuple[float, float]:
     """Return mm in the photo for each micrometre of a vector, and a round length for the bar, µm."""
-    typical = max(float(np.quantile(np.linalg.norm(v, axis=1), SHARE_ON_SCALE)), 1e-3)
+    typical = max(float(np.quantile(np.append(np.linalg.norm(v, axis=1), 0.0), SHARE_ON_SCALE)), 1e-3)
     return longest / typical, nice(typical / 2)
 
 
-def _arrows(at: Floats, v: Floats, factor: float, most: float, kind: str) -> Segments:
-    """Draw vectors, cut at the longest one."""
-    size = np.linalg.norm(v, axis=1, keepdims=True) * factor
-    return Segments(at, at + v * factor * np.minimum(1.0, most / np.maximum(size, 1e-9)), kind)
+class Vectors(NamedTuple):
+    """Residuals drawn in photos, each cut at twice a length that few of them exceed."""
+
+    extent: tuple[Range, Range]
+    factor: float  # mm in the photo for each micrometre
+    longest: float  # mm
+
+    def panel(self, title: str, at: Floats, v: Floats, hints: Sequence[str], used: Flags) -> Map:
+        size = np.linalg.norm(v, axis=1, keepdims=True) * self.factor
+        ends = at + v * self.factor * np.minimum(1.0, 2 * self.longest / np.maximum(size, 1e-9))
+        layers: list[Layer] = [Areas([box(*self.extent)], "open soft thin"), Segments(at, ends, "ink thin")]
+        for chosen, kind, shape, words in ((used, "c1", "dot", ""), (~used, "failed open", "diamond", "left out")):
+            own = np.flatnonzero(chosen).tolist()
+            layers += [Marks(at[own], kind, shape, [hints[n] for n in own], words, 3.0)] if len(own) else []
+        return Map(layers, title, self.extent)
 
 
 def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
-    rows: dict[str, list[int]] = {}
-    for n in np.flatnonzero(known).tolist():
-        rows.setdefault(rays.photo[n], []).append(n)
-    sizes = {photo: rms(rays.v[[n for n in own if rays.used[n]]]) for photo, own in rows.items()}
+    rows = grouped((rays.photo[n], n) for n in np.flatnonzero(known).tolist())
+    sizes = {photo: rms(rays.v[own][rays.used[own]]) for photo, own in rows.items()}
     worst = sorted(rows, key=lambda photo: -sizes[photo])[:MOST_PHOTOS]
-    shown = [photo for photo in rows if photo in worst]
-    crowded = any(len(rows[photo]) > MOST_RAYS for photo in shown)
-    for photo in shown:
-        rows[photo] = sorted(rows[photo], key=lambda n: -float(np.hypot(*rays.v[n])))[:MOST_RAYS]
-    drawn = [n for photo in shown for n in rows[photo]]
+    size = np.linalg.norm(rays.v, axis=1)
+    shown = {photo: sorted(own, key=lambda n: -size[n])[:MOST_RAYS] for photo, own in rows.items() if photo in worst}
+    drawn = [n for own in shown.values() for n in own]
     extent = _extent(plan, set(shown), at[drawn])
     longest = 0.2 * _longer(extent)
-    factor, bar = _scale(rays.v[[n for n in drawn if rays.used[n]]], longest)
-    hints = {n: f"point {rays.point[n]}: {rays.v[n, 0]:+.1f}, {rays.v[n, 1]:+.1f} µm" for n in drawn}
+    factor, bar = _scale(rays.v[drawn][rays.used[drawn]], longest)
+    vectors = Vectors(extent, factor, longest)
     panels = []
-    for photo in shown:
-        used, out = ([n for n in rows[photo] if bool(rays.used[n]) is kept] for kept in (True, False))
-        layers: list[Layer] = [Areas([box(*extent)], "open soft thin")]
-        layers.append(_arrows(at[rows[photo]], rays.v[rows[photo]], factor, 2 * longest, "ink thin"))
-        layers.append(Marks(at[used], "c1", "dot", [hints[n] for n in used], size=3.0))
-        layers += [Marks(at[out], "failed open", "diamond", [hints[n] for n in out], "left out", 3.0)] if out else []
-        panels.append(Map(layers, f"{photo}: {sizes[photo]:.1f} µm", extent))
+    for photo, own in shown.items():
+        hints = [f"point {rays.point[n]}: {rays.v[n, 0]:+.1f}, {rays.v[n, 1]:+.1f} µm" for n in own]
+        panels.append(vectors.panel(f"{photo}: {sizes[photo]:.1f} µm", at[own], rays.v[own], hints, rays.used[own]))
     caption = (
         "Image residuals at their points, measured minus computed, and their rms in each photo. Errors of one point "
         "stand alone; errors of a photo or camera point the same way side by side."
     )
-    if crowded:
+    if any(len(rows[photo]) > MOST_RAYS for photo in shown):
         caption += f" Of each photo the {MOST_RAYS} largest are drawn."
     if len(shown) < len(rows):
         caption += f" The {len(shown)} of {len(rows)} photos with the largest residuals, in flight order."
@@ -114,34 +118,29 @@ def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
 
 def _planes(plan: Plan, rays: Rays, at: Floats, used: Flags) -> list[Picture]:
     cameras = cameras_of(plan.document)
-    rows: dict[str, list[int]] = {}
-    for n in np.flatnonzero(used).tolist():
-        rows.setdefault(cameras[rays.photo[n]]["id"], []).append(n)
+    rows = grouped((cameras[rays.photo[n]]["id"], n) for n in np.flatnonzero(used).tolist())
     shown = {name: rows[name] for name in list(rows)[:CAMERAS]}
     extents = {name: _extent(plan, {rays.photo[n] for n in own}, at[own]) for name, own in shown.items()}
     cells = {name: _cells(at[own], rays.v[own], _longer(extents[name]) / CELLS) for name, own in shown.items()}
     means = np.concatenate([cell[:, 2:4] for cell in cells.values()])
     if not len(means):
         return []
+    longest = 0.8 * max(map(_longer, extents.values())) / CELLS
+    factor, bar = _scale(means, longest)
     panels = []
     for name, cell in cells.items():
-        cell_size = _longer(extents[name]) / CELLS
-        factor, bar = _scale(means, 0.8 * cell_size)
         hints = [f"{n:.0f} residuals, mean {x:+.2f}, {y:+.2f} µm" for _, _, x, y, n in cell.tolist()]
-        layers: list[Layer] = [Areas([box(*extents[name])], "open soft thin")]
-        layers.append(_arrows(cell[:, :2], cell[:, 2:4], factor, cell_size, "ink"))
-        layers.append(Marks(cell[:, :2], "c1", "dot", hints, size=4.0))
-        panels.append(Map(layers, f"camera {name}", extents[name]))
+        vectors = Vectors(extents[name], factor, longest)
+        panels.append(vectors.panel(f"camera {name}", cell[:, :2], cell[:, 2:4], hints, np.ones(len(cell), bool)))
     caption = (
         "Mean image residual in each part of the image plane, over all photos of a camera. Vectors that follow a "
         "pattern tell of a lens, a film or a plate that the calibration does not describe; those of good photos are "
         "short and mixed."
     )
-    longest = float(np.linalg.norm(means, axis=1).max())
-    words = f"{counted(len(shown), 'camera')}; the largest mean is {longest:.2f} µm."
-    factor, bar = _scale(means, 0.8 * _longer(next(iter(extents.values()))) / CELLS)
-    title = "Mean residuals of the image plane"
+    largest = float(np.linalg.norm(means, axis=1).max())
+    words = f"{counted(len(shown), 'camera')}; the largest mean is {largest:.2f} µm."
     bars = [Bar(bar * factor, f"mean {bar:g} µm")]
+    title = "Mean residuals of the image plane"
     return [chart("image-plane", (title, caption, words), panels, columns=min(2, len(panels)), bars=bars)]
 
 

@@ -13,8 +13,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
 from photostrip.network.hypotheses import ALL, DRIFT, HEIGHTS_ONLY, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
 from photostrip.network.observations import drift_columns
-from photostrip.network.problem import BundleProblem
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleProblem, BundleSettings
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED

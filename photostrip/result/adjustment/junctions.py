@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.table import Table
-from photostrip.strip.strip_formation.strip import FormedStrip
+from photostrip.strip.formed_strip import FormedStrip
 
 DIRECTIONS = ("along", "across", "up")
 PPM = 1e6

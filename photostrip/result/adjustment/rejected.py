@@ -20,9 +20,9 @@ from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Plain, natural, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT
 from photostrip.result.table import Table
-from photostrip.strip.gross_errors.control_screening import EITHER, EXCHANGED
-from photostrip.strip.strip_formation.scale_transfer import depths
-from photostrip.strip.strip_formation.strip import model_points
+from photostrip.strip.control_screening import EITHER, EXCHANGED
+from photostrip.strip.formed_strip import model_points
+from photostrip.strip.scale_transfer import depths
 from photostrip.units import MICROMETRES
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity

@@ -289,7 +289,7 @@ def test_projects_may_move_together_with_their_results(here: Path, capsys: pytes
         (["@list.txt"], "list.txt: does not exist"),
         (["strips", "--depfile", "x.d"], "a rule for make needs a target"),
         (["strips", "--executor", "slurm"], "'slurm' is not 'local'"),
-        (["strips", "--executor", "dask:nonsense"], "`dask:nonsense` is not the address of a scheduler"),
+        (["strips", "--executor", "dask:nonsense"], "no Dask scheduler answers at nonsense"),
         (["strips", "-j", "0"], "greater than or equal to 1"),
         (["strips", "-o", "file.txt"], "is a file; expected a folder"),
     ],
@@ -307,7 +307,7 @@ def test_a_batch_that_nobody_computes_says_so(here: Path, monkeypatch: pytest.Mo
     def broken(*_: object, **__: object) -> None:
         raise PhotostripError("no worker process starts")
 
-    monkeypatch.setattr(Alone, "answers", broken)
+    monkeypatch.setattr(Alone, "submit", broken)
     assert main(["batch", "strips", "-o", "out"]) == 70
     summary = json.loads((here / "out" / "summary.json").read_text(encoding="utf-8"))
     assert (summary["exit_code"], summary["finished"], summary["counts"]) == (70, False, {"not run": 3})

@@ -5,15 +5,13 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
 from photostrip import __version__
 from photostrip.cli.main import main
 from photostrip.project.check import check_project
-from photostrip.project.schema.project_file import ProjectFile
-from photostrip.project.simulation import SimulationFile
 from photostrip.project.template import template_files
 from tests.source_tree import ROOT
 
@@ -111,23 +109,6 @@ def test_a_folder_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 # ------------------------------------------------------------------------------------------------------ schema
-
-
-@pytest.mark.parametrize(("option", "kind"), [([], ProjectFile), (["--simulation"], SimulationFile)])
-def test_the_schema_has_every_key(
-    option: list[str], kind: type[ProjectFile | SimulationFile], capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, out, err = call(capsys, "schema", *option)
-    schema = json.loads(out)
-    assert (code, err) == (0, "")
-    assert set(schema["properties"]) == set(kind.model_fields)
-    described = [(name, key) for block in _blocks(schema) for name, key in block["properties"].items()]
-    assert len(described) > 50
-    assert [name for name, key in described if not key.get("description")] == []
-
-
-def _blocks(schema: dict[str, Any]) -> list[dict[str, dict[str, dict[str, object]]]]:
-    return [schema, *schema["$defs"].values()]
 
 
 def test_the_schema_goes_into_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

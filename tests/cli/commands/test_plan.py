@@ -12,7 +12,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.planning.model_plan import ModelSpec, control_layout, given_errors, plan_model
-from photostrip.project.plans.model import load_model_plan
+from photostrip.project.plans import load_model_plan
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.network import snooping, strip_rays
+from photostrip.network import snooping
 from photostrip.network.adjustment import Selection
+from photostrip.network.problem import BundleSettings
 from photostrip.network.reliability import groups_of
-from photostrip.network.settings import BundleSettings
 from photostrip.rejection import UNCONTROLLED
 from photostrip.simulation import Flight, Points, Spec
-from photostrip.statistics import normal_quantile
 from tests.pipeline.blocks import adjusted, simulate
 
 if TYPE_CHECKING:
@@ -60,12 +59,6 @@ def test_the_level_grows_with_the_errors_that_are_established(problem: BundlePro
     assert less.alpha_of_given == pytest.approx(2.0 * every_given.alpha_of_given, rel=0.02)
 
 
-def test_the_level_along_a_strip() -> None:
-    """At a twentieth of the points wrong, as in the benchmark, errors of 3.7 standard deviations are found."""
-    q, i, left = strip_rays.STRIP_LEVEL, 18, 900
-    assert normal_quantile(1 - i * q / (left + i * q) / 2) == pytest.approx(3.68, abs=0.08)
-
-
 def test_control_comes_back_with_the_rays_that_agree_with_it(problem: BundleProblem) -> None:
     """A strip may leave out a control point and its rays, for a wrong one that meets the other all the same."""
     rays = np.bincount(problem.images.point, minlength=problem.points)
@@ -95,19 +88,3 @@ def test_a_tenth_of_the_rays_takes_few_adjustments() -> None:
     assert done.rounds < 30
     assert (wrong & done.selection.images).sum() <= 2
     assert (~wrong & ~done.selection.images).sum() < wrong.sum() / 2  # a wrong ray of two takes the other along
-
-
-def test_of_a_point_on_two_photos_both_rays_go_at_a_quarter_of_the_level(problem: BundleProblem) -> None:
-    """In a strip; of a block the report says what is found at the level of a single observation."""
-    every = Selection.everything(problem)
-    of_block = snooping.ScreenedBundle.of(problem, every, BundleSettings()).limit
-    assert of_block.of(2) == of_block.of(3)
-    limit = snooping.ScreenedBundle.of(problem, every, BundleSettings(), rough=True).limit
-    assert limit.of(3) == limit.of(4) == normal_quantile(1 - limit.alpha / 2)
-    assert limit.of(2) == pytest.approx(normal_quantile(1 - limit.alpha / 8))
-    rows = rays_of(problem, int(np.flatnonzero(np.bincount(problem.images.point) == 2)[0]))
-    search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
-    point, value = problem.images.point[rows[0]], np.zeros(len(problem.images))
-    for size, doubtful in ((0.5 * (limit.value + limit.both), False), (1.01 * limit.both, True)):
-        value[rows] = size
-        assert bool(search._doubtful(every, value, limit)[point]) == doubtful

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.network import strip_rays
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.rejection import WRONG_RAY
@@ -17,9 +16,7 @@ from tests.strips import MICROMETRE, control_points, fly, project
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.network.strip_rays import StripRays
     from photostrip.pipeline.results import Result
-    from photostrip.strip.relative_orientation.orientation import Orientation
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
@@ -77,38 +74,6 @@ def test_the_wrong_ray_across_the_base_is_named_and_the_point_kept(photo: str, p
     assert result.points.rays[row] == 2
     error = result.points.cartesian[row] - strip.xyz[strip.at["p4_1"]]
     assert 1e-4 < np.abs(error).max() < 1.5  # metres, 1:10000
-
-
-@pytest.mark.slow
-def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Five times the standard deviation on one photo: the others keep theirs."""
-    found: list[Floats] = []
-    spread_of = strip_rays._spread_of_photos
-
-    def kept(oriented: Orientation, rays: StripRays) -> Floats:
-        found.append(spread_of(oriented, rays))
-        return found[-1]
-
-    monkeypatch.setattr(strip_rays, "_spread_of_photos", kept)
-    strip = flown(extra=200)
-    xy, at = strip.observations.xy.copy(), strip.observations.photo == 6
-    xy[at] += np.random.default_rng(3).normal(0, np.sqrt(24) * SIGMA, (at.sum(), 2))
-    adjusted(replace(strip, observations=replace(strip.observations, xy=xy)))
-    assert found[0][6] == pytest.approx(5, rel=0.3)
-    assert np.delete(found[0], 6) == pytest.approx(1)
-
-
-def test_two_wrong_points_of_a_corner_do_not_cost_the_good_one() -> None:
-    """A pair alone takes two equal errors among three points of a corner for one: theory 11.5."""
-    strip = flown(extra=20)
-    o = strip.observations
-    # points abeam of photo 106 see photos 105 to 107; both rows on its left side get the same error on 106
-    wrong = {("106", "p5_1"): (0.0, 0.15), ("106", "p4_1"): (0.0, 0.15)}
-    result = adjusted(spoiled(strip, wrong))
-    assert set(found_in(strip, result)) == set(wrong)
-    used = np.zeros(len(o.point), bool)
-    used[result.strips[0].of_photos.rows] = True
-    assert sorted(np.flatnonzero(~used)) == sorted(row_of(strip, *each) for each in wrong)
 
 
 def one_photo_spoiled(seed: int, photo: int, extra: int) -> tuple[Flown, Numbers]:

@@ -97,17 +97,6 @@ def test_what_is_determined_is_adjusted_and_nothing_else(network: str, control: 
     judge(simulation, with_some(simulation, control, cameras))
 
 
-@pytest.mark.parametrize("group", ["", "block"])
-@pytest.mark.parametrize("correction", ["offset", "drift"])
-@pytest.mark.parametrize("cameras", ["xyz", "xy", "z"])
-@pytest.mark.parametrize("control", ["xyz", "xy"])
-def test_an_unknown_error_of_the_cameras_takes_away_what_it_replaces(
-    control: str, cameras: str, correction: str, group: str
-) -> None:
-    simulation = simulate(NETWORKS["block"])
-    judge(simulation, with_some(simulation, control, cameras, correction, group))
-
-
 def judge(simulation: Simulation, inputs: Inputs) -> None:
     truth = truth_of(simulation, inputs)
     if truth.loose > 1.0:

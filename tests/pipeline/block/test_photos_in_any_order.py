@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
     from photostrip.simulation import Simulation
 
-ROUNDING = 1e-9  # metres
 SAME_MINIMUM = 1e-6  # metres, by which two starts of one adjustment end apart
 SENSOR = Camera("uav", 8.8, format=(13.2, 8.8), pixel_size=0.0024)
 FLOWN = Flight(
@@ -125,36 +124,6 @@ def test_sixteen_photos_come_out_as_their_strips_do(given: Callable[[Simulation]
     assert rms(simulation, result) < 0.05
     assert result.findings == ()
     assert document_of(result)["counts"]["strips"] == 4
-
-
-def test_neither_the_list_nor_the_table_decides() -> None:
-    simulation = block()
-    inputs = in_no_order(five_points(simulation))
-    points, rng = inputs.observations, np.random.default_rng(6)
-    order = rng.permutation(len(points.photo_ids))
-    rows = np.argsort(np.argsort(order)[points.photo], kind="stable")
-    mixed = replace(
-        points,
-        photo_ids=tuple(points.photo_ids[n] for n in order),
-        photo=np.argsort(order)[points.photo][rows],
-        point=points.point[rows],
-        xy=points.xy[rows],
-        sigma=points.sigma[rows],
-    )
-    one, other = adjusted(simulation, inputs), adjusted(simulation, replace(inputs, observations=mixed))
-    assert told(one) == told(other)
-    assert apart(one, other) < ROUNDING
-
-
-def test_photos_start_from_their_given_orientations() -> None:
-    """To three degrees and three metres; no strip is looked for then."""
-    simulation = block()
-    inputs = three_corners(simulation)
-    given = replace(in_no_order(inputs), orientations=rough(simulation, 3.0, 3.0))
-    result = adjusted(simulation, given)
-    assert told(result) == "16 photos in no given order start from their given orientations"
-    assert document_of(result)["counts"]["strips"] == 0
-    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
 
 
 def test_oblique_photos_start_from_their_orientations() -> None:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.network.settings import BundleSettings
+from photostrip.network.problem import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.strip.gross_errors import control_search
-from photostrip.strip.independent_models.linking import LinkSettings
+from photostrip.strip import control_search
+from photostrip.strip.model_links import LinkSettings
 from tests.loops import nonempty
 from tests.models import inputs, truth
 from tests.simulated import inputs_of
@@ -81,18 +81,6 @@ def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordin
         (strip.control.ids.index(whole.control.ids[row]), (2,))
     ]
     assert strip.wrong_control[0].size[2] == pytest.approx(5.0, abs=1.0)
-
-
-def test_entries_that_name_nothing_are_refused() -> None:
-    given = truth(3)
-    lists = LinkSettings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
-    with pytest.raises(InputError) as told:
-        triangulate(inputs(given, given.measured()), Settings(links=lists))
-    assert [(fault.key, fault.message.split("`")[1]) for fault in told.value.faults] == [
-        ("processing.links.keep", "M9/P001"),
-        ("processing.links.drop", "M2/104"),
-        ("processing.links.drop", "M1/P001"),
-    ]
 
 
 # ---------------------------------------------------------------------------------------------------- precision

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import photostrip
-from tests.flown import Flown, corridor, orbit, project, snake
+from tests.flown import Flown, corridor, orbit, project
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,24 +37,6 @@ def told(made: Project) -> tuple[list[str], list[str], list[str]]:
 def test_a_sound_flight_has_no_finding(fly: Callable[[np.random.Generator], Flown]) -> None:
     rng = np.random.default_rng(0)
     assert told(project(rng, fly(rng))) == ([], [], [])
-
-
-def test_photos_listed_as_one_strip_though_they_were_flown_in_three_share_no_ids() -> None:
-    rng = np.random.default_rng(0)
-    document, tables = project(rng, snake(rng), rays=200)
-    assert "P301" not in [each.code for each in photostrip.check(document, tables=tables).findings]
-
-
-def test_dense_points_with_heavy_tails_share_no_ids() -> None:
-    rng = np.random.default_rng(0)
-
-    def noise(shape: tuple[int, int]) -> np.ndarray[Any, np.dtype[np.float64]]:
-        wrong = rng.random(shape[0]) < 0.01
-        return rng.standard_t(4, shape) + 20.0 * rng.normal(size=shape) * wrong[:, None]
-
-    document, tables = project(rng, corridor(rng, ahead=30.0), rays=400, noise=noise)
-    found = photostrip.run(document, tables=tables).document["findings"]
-    assert "P301" not in [each["code"] for each in found]
 
 
 @pytest.mark.parametrize("ahead", [0.0, 40.0])

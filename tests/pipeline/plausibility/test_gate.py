@@ -171,24 +171,6 @@ def test_mirrored_images_are_told_apart_from_control_where_the_place_is_known(fl
     assert "or else the image coordinates are mirrored" in finding.message
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("foot", [FOOT, 1200 / 3937])
-def test_projected_control_in_feet(foot: float) -> None:
-    findings = told(with_control(inputs_of(simulation("utm")), lambda enu: enu / foot))
-    (finding,) = [each for each in findings if each.severity == "error"]
-    assert finding.code == "P403"
-    assert "US survey feet" in finding.fix
-
-
-@pytest.mark.parametrize(("crs", "severity"), [("EPSG:27700", "error"), ("EPSG:3067", "warning")])
-def test_control_of_another_country(crs: str, severity: str) -> None:
-    """In the one it lies nowhere on the Earth; in the other beside Finland, and an area proves nothing by itself."""
-    inputs = inputs_of(simulation("utm"))
-    (finding,) = told(replace(inputs, frames=(replace(inputs.frames[0], crs=crs),)))
-    assert (finding.code, finding.severity) == ("P402", severity)
-    assert finding.key == "control[0].crs"
-
-
 def in_bulgaria(folder: Path, second: str | None = None) -> Path:
     """Write a strip over the border of two zones of 1942, for whose datum EPSG names countries farther north."""
     spec = Spec(
@@ -219,18 +201,6 @@ def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: fl
     (finding,) = told(with_control(inputs_of(simulation(frame)), lambda enu: enu * factor))
     assert finding.code == "P402"
     assert finding.evidence["factor"] == pytest.approx(1 / factor)
-
-
-@pytest.mark.slow
-def test_the_principal_distance_of_another_lens() -> None:
-    inputs = inputs_of(simulation("utm"))
-    strip = inputs.strips[0]
-    camera = replace(strip.camera, principal_distance=153.0 * 0.73)
-    (finding,) = [
-        each for each in told(replace(inputs, strips=(replace(strip, camera=camera),))) if each.severity == "error"
-    ]
-    assert finding.code == "P105"
-    assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=2.0)
 
 
 def second_list(inputs: Inputs, change: Callable[[Floats], Floats]) -> tuple[Inputs, tuple[str, ...]]:
@@ -265,26 +235,6 @@ def test_one_of_two_lists_in_feet_or_elsewhere(before: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [lambda east: east + 1e5, lambda east: 10 * east, lambda east: float(f"{str(east)[:3]}7{str(east)[3:]}")]
-)
-def test_a_control_point_far_from_all_others_is_named_with_the_right_coordinate(
-    wrong: Callable[[float], float],
-) -> None:
-    """100 km off, the decimal point, a digit too many: most strips cannot be laid on such control."""
-    inputs = inputs_of(simulation("utm"))
-    row = int(control_rows(inputs)[4])
-    name, right = inputs.control.ids[row], float(inputs.control.enu[row, 0])
-
-    def slip(enu: Floats) -> Floats:
-        enu[row, 0] = wrong(right)
-        return enu
-
-    (finding,) = told(with_control(inputs, slip))
-    assert (finding.code, finding.points, finding.evidence["axis"]) == ("P406", (name,), "east")
-    assert float(finding.evidence["would_fit"]) == pytest.approx(right, abs=1e-3)
-
-
-@pytest.mark.parametrize(
     ("role", "axis", "step"),
     [
         ("control", 0, 7000.0),
@@ -312,21 +262,6 @@ def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role:
     assert (finding.code, finding.points, finding.severity) == ("P406", (name,), "warning")
     assert "typing error" in finding.message
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("frame", "written", "role"),
-    [("utm", 1e9, "control"), ("utm", 1e17, "check"), ("local", -1e8, "check"), ("local", 1e30, "control")],
-)
-def test_a_height_beyond_the_earth_is_told_without_digits(frame: str, written: float, role: str) -> None:
-    inputs = inputs_of(simulation(frame))
-    row = int(control_rows(inputs)[1] if role == "control" else np.flatnonzero(inputs.control.check)[1])
-    axis = np.outer(np.arange(len(inputs.control)) == row, [False, False, True])
-    (finding,) = told(with_control(inputs, lambda enu: np.where(axis, written, enu)))
-    assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
-    assert f"has {written:.10g} for up" in finding.message
-    assert "no place on the Earth" in finding.message
-    assert "would_fit" not in finding.evidence
 
 
 @pytest.mark.slow
@@ -587,17 +522,6 @@ def test_a_reduced_photo_is_named_with_its_scale() -> None:
     (finding,) = (each for each in triangulate(inputs, case.settings).findings if each.code == "P109")
     assert set(finding.photos) == ids
     assert finding.evidence["scale"] == pytest.approx(1.0 / 1.5, abs=0.01)
-
-
-@pytest.mark.parametrize(("wrong", "least"), [(1, 3), (2, 4)])
-def test_one_wrong_point_of_three_is_no_other_control_but_two_of_four_are(wrong: int, least: int) -> None:
-    inputs = inputs_of(simulation())
-    rows = control_rows(inputs)[[0, -1, 2, 3][:least]]
-    control = inputs.control.take(rows)
-    enu = control.enu.copy()
-    enu[:wrong, :2] += [[5000.0, -3000.0], [-9000.0, 4000.0]][:wrong]
-    found = codes(told(replace(inputs, control=replace(control, enu=enu))))
-    assert ("P409" in found) is (least > 3)
 
 
 def test_every_kind_of_mistake_is_planted_in_the_benchmark() -> None:

@@ -86,12 +86,3 @@ def test_check_points_that_lie_beside_the_result_are_named_together(
     assert line.startswith("P411 the check points of control[0] all lie")
     for count in (1, 2):
         assert "P411" not in {each.code for each in with_moved_checks(shift, count, adjustment).findings}
-
-
-@pytest.mark.slow
-def test_lists_that_go_together_share_nothing() -> None:
-    """With single wrong points too."""
-    assert two_lists((0.0, 0.0, 0.0)).findings == ()
-    result = two_lists((0.0, 0.0, 0.0), GrossError("control", count=2, size_m=3.0))
-    assert {each.code for each in result.findings} <= {"P406"}
-    assert len(result.strips[0].wrong_control) == 2

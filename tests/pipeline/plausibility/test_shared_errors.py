@@ -84,26 +84,6 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
     assert rms(simulation, result) < 0.4
 
 
-def test_of_heights_alone_only_up_is_named() -> None:
-    _, result = adjusted(strips=1, shift=(0.0, 0.0, 12.0), use=(False, False, True))
-    (finding,) = result.findings
-    assert finding.code == "P208"
-    assert "m up" in finding.message
-    assert "east" not in finding.message
-    assert list(finding.evidence) == ["offset_up_m"]
-
-
-@pytest.mark.slow
-def test_one_strip_of_several_is_named_alone() -> None:
-    """Only the second strip is off."""
-    shift = np.repeat([[0.0] * 3, [4.0, 4.0, 0.0]], 10, axis=0)
-    _, result = adjusted(shift=shift)
-    (finding,) = result.findings
-    assert finding.code == "P208"
-    assert "of strip B " in finding.message
-    assert set(finding.photos) == set(result.inputs.strips[1].photos)
-
-
 @pytest.mark.slow
 def test_a_drift_of_the_positions_is_named() -> None:
     """Half a metre from photo to photo."""
@@ -122,16 +102,6 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
     assert finding.code == "P107"
     assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=0.05)
     assert rms(simulation, result) < 0.4
-
-
-def test_single_wrong_positions_stay_single() -> None:
-    """Two positions that are off take no offset of all with them."""
-    shift = np.zeros((20, 3))
-    shift[2, 0], shift[13, 2] = 30.0, -20.0
-    _, result = adjusted(shift=shift)
-    assert lost(result) == ["position", "position"]
-    assert result.bundle is not None
-    assert result.bundle.screened.common == ()
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,9 +13,6 @@ from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Gnss, Image, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations
 from tests.simulated import inputs_of, settings_of
-
-if TYPE_CHECKING:
-    from photostrip.simulation import Simulation
 
 BLOCK = Spec(
     seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()
@@ -58,34 +54,8 @@ def test_a_start_may_be_far_off() -> None:
     assert "P204" in told(replace(inputs_of(made), orientations=observed), BUNDLE)
 
 
-def long_strip() -> Simulation:
-    """Simulate a strip that bends between its bands by more than a low polynomial takes out."""
-    return simulate(Spec(seed=8, flight=Flight(photos=60, scale=20000.0), control=Control(every=15), terrain=HILLS))
-
-
 @pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
 def test_the_bend_of_a_long_strip_is_no_typing_error(adjustment: str) -> None:
     """A check point between two bands lies metres from where a low polynomial puts it."""
     made = simulate(Spec(seed=10, flight=Flight(photos=60), control=Control(every=15), terrain=HILLS))
     assert told(inputs_of(made), replace(settings_of(made), adjustment=adjustment)) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("role", "index", "worth"), [("K", 1, 10.0), ("G", 5, 100.0)])
-def test_a_typing_error_in_a_long_strip_is_told_as_the_adjustment_sees_it(role: str, index: int, worth: float) -> None:
-    made = long_strip()
-    inputs = inputs_of(made)
-    row = [number for number, name in enumerate(inputs.control.ids) if name.startswith(role)][index]
-    enu = inputs.control.enu.copy()
-    digit = enu[row, 1] // worth % 10
-    enu[row, 1] += worth * ((digit + 5) % 10 - digit)
-    result = triangulate(replace(inputs, control=replace(inputs.control, enu=enu)), settings_of(made))
-    (finding,) = result.findings
-    assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
-    assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, 1], abs=0.01)
-    # the same on the ground, where the metres of the map are longer or shorter
-    fitting = enu[row] - [0.0, result.control_differences[row, 1], 0.0]
-    wrong, right = result.frames[0].cartesian_from_ground(np.array([enu[row], fitting]))
-    off = float(finding.evidence["off_m"])
-    assert abs(off) == pytest.approx(np.linalg.norm(wrong - right), abs=1e-4)
-    assert off * result.control_differences[row, 1] < 0

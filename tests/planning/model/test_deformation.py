@@ -161,18 +161,6 @@ def test_the_printed_sign_of_kappa_in_eq_10_9_bends_heights_the_wrong_way() -> N
     assert np.abs(wrong).max() > 1.9 * np.abs(exact).max() > 1e-4
 
 
-def test_factors_of_the_orientation_are_the_scatter_of_exact_orientations() -> None:
-    f, a, b = 100.0, 65.0, 70.0
-    rng = np.random.default_rng(2)
-    x, y = SIX[:, 0], SIX[:, 1]
-    rows = np.column_stack([x * y / f, x, -(x - b) * y / f, -(f + y**2 / f), -(x - b)])
-    elements = -np.linalg.lstsq(rows, rng.normal(size=(6, 20_000)), rcond=None)[0].T
-    where = np.array([[0.0, 0.0], [0.0, 65.0], [70.0, -65.0], [35.0, 30.0]])
-    c = np.array([parallax_error(np.broadcast_to(p, (20_000, 2)), elements, f, b) for p in where])
-    expected = orientation_factors(where, f, a, b)
-    assert c.var(axis=1) == pytest.approx(expected, rel=0.04)
-
-
 # ---------------------------------------------------------------------------------------------------- estimation
 
 

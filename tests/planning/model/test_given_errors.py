@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.model_plan import ControlPoint, ModelSpec, NamedPoint, given_errors, plan_model
-from tests.draws import orthogonal_normal
+from photostrip.planning.model_plan import ControlPoint, ModelSpec, NamedPoint, given_errors
 from tests.planning.formulas import intersected
 
 if TYPE_CHECKING:
@@ -83,45 +82,3 @@ def test_given_errors_are_those_of_the_exact_model_and_its_fit() -> None:
     assert np.abs(expected).max() > 0.05
     causes = found.parts.from_measuring + found.parts.from_elements + found.parts.from_control
     assert causes == pytest.approx(found.parts.total, abs=1e-12)
-
-
-def similarity_left(model: Floats, given: Floats, every: Floats) -> Floats:
-    """Transform points by the similarity in space that fits a model to its control with equal weights."""
-    a, b = model - model.mean(axis=0), given - given.mean(axis=0)
-    u, s, vt = np.linalg.svd(b.T @ a)
-    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    scale = (s * [1.0, 1.0, np.linalg.det(u @ vt)]).sum() / (a**2).sum()
-    found: Floats = scale * (every - model.mean(axis=0)) @ turn.T + given.mean(axis=0)
-    return found
-
-
-@pytest.mark.slow
-def test_points_with_relief_scatter_as_expected_after_a_similarity_in_space() -> None:
-    # heights from -120 to 120 m at 1500 m; without the terms of relief plan would be 14 % off, heights 8 %
-    heights = (120.0, -60.0, -100.0, 80.0, 30.0)
-    places = ((2.0, 80.0), (88.0, 78.0), (-3.0, -82.0), (91.0, -75.0), (40.0, 5.0))
-    control = tuple(ControlPoint(at, str(k), height=h) for k, (at, h) in enumerate(zip(places, heights, strict=True)))
-    points = (NamedPoint((20.0, 30.0), "A", height=120.0), NamedPoint((70.0, -60.0), "B", height=-120.0))
-    spec = ModelSpec(F, base=B, width=A, scale=SCALE, control=control, points=points, control_sigma=(0.02, 0.02, 0.03))
-    forecast = plan_model(spec)
-    every = xyz((*control, *points))
-    truth = every * (1, 1, -1)
-    six = np.array([[x, y, F] for y in (0.0, A, -A) for x in (0.0, B)])
-    rows = np.column_stack([six[:, 0] * six[:, 1] / F, six[:, 0], -(six[:, 0] - B) * six[:, 1] / F])
-    rows = np.column_stack([rows, -(F + six[:, 1] ** 2 / F), -(six[:, 0] - B)])
-    turn = np.array([[0, -B, 0, 0, 0], [-B, 0, 0, 0, 0], [0, -1, 0, 0, 1], [-1, 0, 1, 0, 0], [0, 0, 0, 1.0, 0]])
-    errors = []
-    for drawn in orthogonal_normal(np.random.default_rng(9), 420, 6 + 4 * len(every) + 15):
-        of_six, of_points, of_control = np.split(drawn, [6, 6 + 4 * len(every)])
-        elements = turn @ -np.linalg.lstsq(rows, np.sqrt(2) * spec.image_sigma * of_six, rcond=None)[0]
-        left, right = spec.image_sigma * of_points.reshape(2, len(every), 2)
-        # the image errors move the point of the exact pair; the elements then move it on
-        one, two = (F * (every[:, :2] - (x, 0)) / every[:, 2:] + e for x, e in ((0.0, left), (B, right)))
-        depth = B * F / (one[:, 0] - two[:, 0])
-        seen = np.column_stack([depth * one[:, 0] / F, depth * (one[:, 1] + two[:, 1]) / 2 / F, depth])
-        model = intersected(seen, B, elements, F)
-        given = truth[:5] + of_control.reshape(5, 3) * np.array([0.02, 0.02, 0.03]) / UNIT
-        errors.append((similarity_left(model[:5], given, model) - truth)[5:] * UNIT)
-    ratio = np.std(errors, axis=0) / forecast.at_points
-    assert ratio == pytest.approx(np.ones_like(ratio), abs=0.07)
-    assert ratio.mean() == pytest.approx(1.0, abs=0.02)

@@ -12,7 +12,6 @@ import pytest
 from photostrip.errors import GeometryError, InputError
 from photostrip.planning.ideal_strip import (
     BUNDLE,
-    METHODS,
     SIMILARITY,
     ControlLayout,
     Spot,
@@ -32,7 +31,7 @@ from photostrip.planning.strip_design import (
     worst,
 )
 from photostrip.simulation import FILM, Points
-from photostrip.strip.gross_errors.pair_screening import DETECTABLE
+from photostrip.strip.pair_screening import DETECTABLE
 from tests.loops import nonempty
 from tests.planning.strip.repeated import scatter
 
@@ -132,24 +131,7 @@ def test_too_little_control_is_told_and_not_raised() -> None:
         accuracy(strip_of(5), ControlLayout(""), (Spot(1, 1),), SIMILARITY)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_control_on_the_line_of_flight_levels_no_strip(method: str) -> None:
-    found = outcome(strip_of(6), ControlLayout("", bands=6, per_band=1), method)
-    assert found.accuracy is None
-    assert found.reason
-
-
 # --------------------------------------------------------------------------------------------------- reliability
-
-
-def test_detectable_errors_of_best_estimates_follow_from_their_sigmas() -> None:
-    strip = strip_of(9)
-    layout = ControlLayout("", bands=3, sigma=(0.2, 0.2, 0.3))
-    found = accuracy(strip, layout, spots_of(layout, 9, 3), BUNDLE)
-    adjusted = np.diagonal(found.covariance[found.control], axis1=1, axis2=2)
-    given = np.array(layout.sigma) ** 2
-    # a coordinate predicted by all others: variance given^2 / (given - adjusted)
-    assert found.detectable == pytest.approx(DETECTABLE * given / np.sqrt(given - adjusted), rel=1e-6)
 
 
 @pytest.mark.parametrize("method", [SIMILARITY, "degree 2"])

@@ -161,34 +161,9 @@ def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: st
     assert finding.key == "fiducial_measurements.unit"
 
 
-@given(st.lists(st.floats(0.6, 1.6), min_size=1, max_size=8))
-def test_scans_and_old_paper_are_no_other_unit(scales: list[float]) -> None:
-    assert units.find_wrong_mark_units(np.array(scales), [f"{number}" for number in range(len(scales))]) == []
-
-
 @pytest.mark.parametrize("factor", [10.0, 0.1, 1000.0, 1e-3])
 def test_a_principal_distance_off_by_a_power_of_ten(factor: float) -> None:
     made = simulation()
     camera = replace(made.camera, principal_distance=made.camera.principal_distance * factor)
     (finding,), _ = units.find_wrong_units(made.observations, dict.fromkeys(made.strips[0][1], camera))
     assert (finding.code, finding.fix) == ("P105", "is it 153 mm?")
-
-
-def test_coordinates_from_a_corner_are_no_other_unit() -> None:
-    made = simulation()
-    o, cameras = made.observations, dict.fromkeys(made.strips[0][1], made.camera)
-    (all_of_them,), _ = units.find_wrong_units(replace(o, xy=o.xy + 115.0), cameras)
-    assert all_of_them.code == "P101"
-    assert "not counted from the centre of the photo" in all_of_them.message
-    one = np.where(o.photo[:, None] == 2, o.xy + 115.0, o.xy)
-    (of_one,), factor = units.find_wrong_units(replace(o, xy=one), cameras)
-    assert (of_one.photos, factor) == ((o.photo_ids[2],), {"film": 1.0})
-
-
-@pytest.mark.parametrize(("stated", "told"), [(0.005, False), (0.1, False), (5.0, True)])
-def test_a_standard_deviation_in_another_unit(stated: float, told: bool) -> None:
-    assert bool(units.find_wrong_sigmas(np.array([0.004, 0.006, np.nan]), stated, "A")) is told
-    assert not units.find_wrong_sigmas(np.array([4e-5, 3e-5]), stated, "A")  # computed, not measured
-    off = np.array([[0.1, -0.2, 0.3]] * 3)
-    given = [each.code for each in units.find_wrong_sigmas_of_given(off, np.full((3, 3), 20 * stated))]
-    assert given == (["P108"] if told else [])

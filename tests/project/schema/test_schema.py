@@ -85,10 +85,6 @@ def test_editors_are_told_what_is_read() -> None:
     assert '{"type": "null"}' not in text
 
 
-def test_the_schema_is_the_same_on_every_call() -> None:
-    assert json.dumps(schema_of("project")) == json.dumps(schema_of("project"))
-
-
 @pytest.mark.parametrize(
     ("given", "part"),
     [
@@ -176,25 +172,3 @@ def test_the_page_tells_every_default_and_unit() -> None:
         if "unit" in each:
             words.append(each["unit"])
         assert any(all(word in row for word in words) for row in rows), (name, words)
-
-
-def test_the_model_is_the_contract() -> None:
-    assert list(ProjectFile.model_fields) == [
-        "photostrip",
-        "name",
-        "extends",
-        "cameras",
-        "strips",
-        "photos",
-        "observations",
-        "models",
-        "fiducial_measurements",
-        "control",
-        "camera_positions",
-        "orientations",
-        "output",
-        "processing",
-        "tolerances",
-        "accept",
-        "export",
-    ]

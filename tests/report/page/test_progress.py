@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.report.page import progress as module
 from photostrip.report.page.layout import cells
-from photostrip.report.page.progress import WIPE, Progress, batch_table, progress, wanted
+from photostrip.report.page.progress import WIPE, Progress, batch_progress, progress, wanted
 
 
 class Terminal(io.StringIO):
@@ -93,13 +93,13 @@ def _broken(_text: str) -> int:
     raise OSError
 
 
-def test_the_table_of_a_batch_shows_control_characters_and_sends_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bar_of_a_batch_shows_control_characters_and_sends_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     stream = Terminal()
-    with batch_table(stream, 2) as table:
-        table.begun("a\x1b]0;title\x07/project.yaml")
-        assert table._live is not None
-        table._live.refresh()
-        table.say("b\x1b]0;title\x07: faulty")
+    with batch_progress(stream, 2) as shown:
+        shown.begun("a\x1b]0;title\x07/project.yaml")
+        assert shown._bar is not None
+        shown._bar.refresh()
+        shown.say("b\x1b]0;title\x07: faulty")
     assert "\x1b]" not in stream.getvalue()
     assert stream.getvalue().count("\\x1b]0;title\\x07") >= 2

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from photostrip.pipeline.run import triangulate
-from photostrip.simulation import DIGITAL, Flight, Ground, Image, Points, Spec, Terrain, simulate
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import Pairs
 from photostrip.strip.relative_orientation.solution import base_rays, solve_elements, turns
 from photostrip.strip.strip_errors import times_a_good_pair
-from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
@@ -70,21 +66,3 @@ def test_points_scatter_as_many_times_as_in_a_good_pair(spread: float, kappa: fl
     good = repeated(*band(BASE, kappa), DRAWS, NOISE)
     by_itself, by_good = (scatter(solve_elements(pairs).elements, measured) for pairs in (measured, good))
     assert of(*band(spread, kappa)) == pytest.approx(by_itself / by_good, rel=0.05)
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_sound_strips_along_the_long_side_of_the_format_are_not_weak(seed: int) -> None:
-    """Condition numbers of up to 260, which grow with the focal length; their points are fine."""
-    camera = replace(DIGITAL, principal_distance=24.0, format=(23.5, 15.6), pixel_size=0.0044)
-    flight = Flight(
-        photos=8,
-        strips=2,
-        flying_height=100.0,
-        end_lap_percent=80.0,
-        side_lap_percent=60.0,
-        attitude_sigma_deg=(2.0, 2.0, 2.0),
-    )
-    spec = Spec(seed=seed, camera=camera, ground=Ground(crs="local"), flight=flight, terrain=Terrain(relief=10.0))
-    simulation = simulate(replace(spec, points=Points(extra_per_model=40), image=Image(sigma_um=2.0)))
-    result = triangulate(inputs_of(simulation), settings_of(simulation))
-    assert [note.message for note in result.notes if note.code == "weak-pair"] == []

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.errors import InputError
-from photostrip.strip.image_coordinates.fiducial_marks import PLACES, solve
+from photostrip.strip.fiducial_marks import PLACES, solve
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import corrections, lens_distortion
-from photostrip.strip.image_coordinates.corrections import (
+from photostrip.strip import corrections, lens_distortion
+from photostrip.strip.corrections import (
     Bending,
     ImageCorrectionSettings,
     Refined,
@@ -155,20 +155,6 @@ def test_the_jacobian_agrees_with_differences(distortion: Distortion, points: Fl
     assert np.allclose(lens_distortion.jacobian(points, distortion), np.stack(columns, -1), rtol=0, atol=1e-7)
 
 
-# ------------------------------------------------------------------------------------------- signs
-
-
-@directions
-def test_a_pincushion_image_is_drawn_in(direction: str) -> None:
-    """A lens that draws the corners out: the image is larger than the ideal, in whatever direction it is written."""
-    sign = 1 if direction == BACKWARD else -1
-    camera = replace(PLAIN, distortion=brown(direction, (sign * 1e-7, 0.0, 0.0)))
-    image = np.array([[100.0, 0.0], [0.0, -100.0]])
-    found = refine(image, camera)
-    assert found.observations.xy == pytest.approx(image * 0.999, abs=0.5 * MICROMETRE)
-    assert found.largest_um["distortion"] == pytest.approx(100.0, rel=0.005)
-
-
 # ------------------------------------------------------------------------------------------- tables
 
 
@@ -195,24 +181,6 @@ def test_points_beyond_the_table_are_refused_by_name(direction: str) -> None:
     for convert in (corrections.distort, corrections.undistort):
         with pytest.raises(InputError, match="lies beyond the distortion table"):
             convert(image, camera)
-
-
-@pytest.mark.parametrize(
-    ("radius", "values", "message"),
-    [
-        ((10.0, 20.0), (0.001,), "2 radii and 1 distortions"),
-        ((), (), "0 radii and 0 distortions"),
-        ((0.0,), (0.0,), "a radius above 0"),
-        ((0.0, 20.0, 10.0), (0.0, 0.001, 0.002), "must increase"),
-        ((-1.0, 20.0), (0.0, 0.001), "must increase from 0 or above"),
-        ((0.0, 20.0), (0.003, 0.001), "at radius 0 is 0.003 mm; it must be 0"),
-    ],
-)
-def test_a_table_that_is_none_is_refused(radius: tuple[float, ...], values: tuple[float, ...], message: str) -> None:
-    camera = replace(PLAIN, distortion=Distortion("radial-table", FORWARD, radius=radius, distortion=values))
-    (fault,) = lens_distortion.faults(camera)
-    assert message in fault.message
-    assert fault.key == "cameras.plain.distortion"
 
 
 # ------------------------------------------------------------------------------------------- no inverse
@@ -306,14 +274,6 @@ def test_the_constant_agrees_with_the_printed_formula() -> None:
         printed = 2335 / (H - h) * ((1 - 0.02257 * h) ** 5.256 - (1 - 0.02257 * H) ** 5.256)
         printed = (printed - 277.0 * (1 - 0.02257 * H) ** 4.256) * 1e-6
         assert refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
-
-
-def test_refraction_without_heights_or_below_the_ground_is_refused() -> None:
-    image = np.array([[1.0, 1.0]])
-    with pytest.raises(InputError, match="flying height and height of the ground are not known"):
-        refine(image, PLAIN, ImageCorrectionSettings(refraction=True, flying_height=3000.0))
-    with pytest.raises(InputError, match="the flying height 400 m is not above the ground, 900 m"):
-        refine(image, PLAIN, ImageCorrectionSettings(refraction=True, flying_height=400.0, ground_height=900.0))
 
 
 # ------------------------------------------------------------------------------------------- Earth curvature

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from photostrip.camera import Camera
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import interior
-from photostrip.strip.image_coordinates.corrections import InteriorSettings
-from photostrip.strip.image_coordinates.interior import FilmDeformation
+from photostrip.strip import interior
+from photostrip.strip.corrections import InteriorSettings
+from photostrip.strip.interior import FilmDeformation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

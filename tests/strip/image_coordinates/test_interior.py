@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
-from photostrip.strip.image_coordinates import interior
-from photostrip.strip.image_coordinates.corrections import InteriorSettings
-from photostrip.strip.image_coordinates.interior import InteriorOrientation, linear_shape
+from photostrip.strip import interior
+from photostrip.strip.corrections import InteriorSettings
+from photostrip.strip.interior import InteriorOrientation
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ EIGHT = Camera("RMK TOP", 153.0, fiducials=CORNERS.fiducials | SIDES.fiducials)
 OBLONG = Camera(
     "MKF", 125.0, fiducials={"1": (110.0, -80.0), "2": (-110.0, -80.0), "3": (-110.0, 80.0), "4": (110.0, 80.0)}
 )
-DIGITAL = Camera("DMC", 120.0, pixel_size=0.012)
 CAMERAS = [pytest.param(camera, id=camera.name) for camera in (CORNERS, SIDES, EIGHT, OBLONG)]
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -157,24 +156,6 @@ def test_film_deformation_is_taken_out(camera: Camera, seed: int) -> None:
     assert not found.notes
 
 
-@given(
-    st.floats(0.5, 2),
-    st.floats(0.5, 2),
-    st.floats(-3, 3),
-    st.floats(-0.3, 0.3),
-    st.booleans(),
-)
-def test_scales_rotation_and_shear_are_those_that_were_put_in(
-    scale_x: float, scale_y: float, rotation: float, shear: float, mirrored: bool
-) -> None:
-    x_axis = np.array([np.cos(rotation), np.sin(rotation)]) * scale_x
-    # seen along the x axis, the y axis stands at a right angle plus the shear; mirrored, on the other side
-    direction = rotation + (np.pi / 2 + shear) * (-1 if mirrored else 1)
-    y_axis = np.array([np.cos(direction), np.sin(direction)]) * scale_y
-    found = linear_shape(np.stack([x_axis, y_axis], 1))
-    assert np.allclose(found, (scale_x, scale_y, rotation, shear), rtol=0, atol=1e-12)
-
-
 def test_sigma0_is_the_precision_of_the_marks() -> None:
     rng = np.random.default_rng(7)
     photos = {f"{i}": film(EIGHT, rng) for i in range(400)}
@@ -243,14 +224,6 @@ def test_too_few_marks_are_refused(transform: str, names: str, message: str) -> 
         orient({"1": {name: calibrated(CORNERS)[name] for name in names.split()}}, transform=transform)
 
 
-def test_marks_on_one_line_are_refused_by_name() -> None:
-    line = Camera("line", 100.0, fiducials={"A": (-100.0, 0.0), "B": (0.0, 0.3), "C": (100.0, 0.0)})
-    assert messages({"1": calibrated(line)}, line, "affine") == [
-        "photo 1: marks A, B, C lie on one line: no affine transformation"
-    ]
-    assert orient({"1": calibrated(line)}, line).transforms == ("conformal",)
-
-
 def test_every_fault_of_every_photo_is_told_at_once() -> None:
     marks = calibrated(CORNERS)
     photos: dict[str, Marks] = {
@@ -303,15 +276,6 @@ def test_a_strip_measured_mirrored_is_mirrored_back_and_named(camera: Camera, tr
     measured = points(found.photo_ids, truth @ flip.T + [0.0, 4000.0])
     # two marks show no hand: they follow the other photos of their camera
     assert np.abs(interior.transform(measured, found).xy - np.tile(truth, (len(found.photo_ids), 1))).max() < PICOMETRE
-
-
-@pytest.mark.parametrize("majority", [False, True])
-def test_one_photo_mirrored_against_the_others_is_refused(majority: bool) -> None:
-    marks = film(EIGHT, np.random.default_rng(1))
-    usual, other = (moved(marks, quarter_turns(0, mirrored=mirrored)) for mirrored in (majority, not majority))
-    assert messages({"1": usual, "2": other, "3": usual}, EIGHT) == [
-        "photo 2: the fiducial marks are mirrored against the other photos of camera RMK TOP"
-    ]
 
 
 # ------------------------------------------------------------------------------------------- wrong numbers
@@ -377,26 +341,3 @@ def test_a_poor_fit_names_photo_and_mark() -> None:
     assert "at mark B" in note.message
     (alike,) = orient({"1": {**calibrated(CORNERS), "F2": np.array([-106.0, -105.0])}}).notes
     assert alike.message.endswith("with so few marks it cannot be told which is wrong")
-
-
-def test_an_odd_affinity_is_told() -> None:
-    found = orient({"1": moved(calibrated(CORNERS), np.diag([1.0, 1.015]))})
-    assert codes(found) == ["strong-affinity"]
-    assert "scales that differ by 1.5 % and a shear of 0.00 degrees (photo 1)" in found.notes[0].message
-
-
-def test_digital_photos_pass_as_they_are() -> None:
-    found = interior.orient(table({"a": calibrated(CORNERS)}), {"a": CORNERS, "b": DIGITAL}, InteriorSettings())
-    measured = points(("a", "b"), np.array([[1.0, 2.0], [30.0, -40.0]]))
-    image = interior.transform(measured, found)
-    assert np.array_equal(image.xy[2:], measured.xy[2:])
-    assert np.array_equal(image.sigma[2:], measured.sigma[2:])
-    nothing = interior.orient(table({}), {"b": DIGITAL}, InteriorSettings())
-    only = points(("b",), np.array([[1.0, 2.0]]))
-    assert interior.transform(only, nothing) is only
-
-
-def test_points_of_a_photo_without_orientation_are_refused() -> None:
-    found = orient({"a": calibrated(CORNERS)})
-    with pytest.raises(InputError, match="photo z: no fiducial marks measured"):
-        interior.transform(points(("a", "z"), np.zeros((1, 2))), found)

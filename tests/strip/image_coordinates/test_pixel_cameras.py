@@ -9,8 +9,8 @@ import pytest
 
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
-from photostrip.strip.image_coordinates.lens_distortion import image_from_ideal
-from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PixelCamera, in_millimetres
+from photostrip.strip.lens_distortion import image_from_ideal
+from photostrip.strip.pixel_cameras import CONVENTIONS, PixelCamera, in_millimetres
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats

@@ -16,15 +16,15 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models, models_of
-from photostrip.strip.independent_models import linking
-from photostrip.strip.independent_models.linking import LinkSettings
+from photostrip.strip import model_links
+from photostrip.strip.model_links import LinkSettings
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import ModelPoints
-    from photostrip.strip.independent_models.formation import FormedModels
+    from photostrip.strip.model_strip import FormedModels
 
     Floats = NDArray[np.float64]
 
@@ -54,8 +54,8 @@ def test_the_estimate_is_that_of_a_general_optimiser() -> None:
     true = truth(2, 4, 3)
     measured = true.measured(np.random.default_rng(1).normal(size=(len(true.model), 3)), (0.01, 0.02, 0.05))
     models = models_of(strip_of(measured), measured, LinkSettings())
-    shared = linking.common(models)
-    solved = linking.solve(shared, models, np.ones(len(shared.link), bool))
+    shared = model_links.common(models)
+    solved = model_links.solve(shared, models, np.ones(len(shared.link), bool))
     a, b = models.xyz[shared.before], models.xyz[shared.after]
     middle = b.mean(axis=0)
     start = solved.similarities
@@ -98,18 +98,6 @@ def test_a_gross_error_is_named_and_left_out(kind: str, size: float) -> None:
         ground = np.concatenate([true.points, true.centers])[each.node]
         off = Similarity.from_points(each.node_xyz, ground).residuals(each.node_xyz, ground)
         assert 0.02 < np.sqrt((off**2).mean()) < 0.5  # metres; 0.4 mm are 3.6 m at 1:9000
-
-
-@pytest.mark.slow
-def test_good_points_are_rejected_as_rarely_as_stated() -> None:
-    gone = links = 0
-    for seed in range(40):
-        true = truth(10, 4, seed)
-        formed = formed_of(true.measured(np.random.default_rng(seed).normal(size=(len(true.model), 3))))
-        gone += len({int(formed.links.shared.link[each.row]) for each in formed.links.rejections})
-        links += formed.links.shared.count
-    assert links == 360
-    assert gone <= 11  # 3.6 are expected at the level of 0.01; more than 11 have a probability of 0.001
 
 
 def without(measured: ModelPoints, rows: NDArray[np.bool_]) -> ModelPoints:

@@ -18,6 +18,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.strip.fitted_strip import image_variance
+from photostrip.strip.intersection import intersect
 from photostrip.strip.relative_orientation.orientation import (
     assess_pairs,
     orient_pairs,
@@ -34,7 +35,6 @@ from photostrip.strip.relative_orientation.solution import (
     start_values,
     y_parallaxes,
 )
-from photostrip.strip.strip_formation.intersection import intersect
 from tests.strips import (
     MICROMETRE,
     Flown,
@@ -266,14 +266,6 @@ def test_a_y_parallax_has_the_variance_across_the_base(sigma: tuple[float, float
 # --------------------------------------------------------------------------------------------- weak pairs
 
 
-def test_a_hair_band_is_refused() -> None:
-    left = np.array([[0, 0], [70, 0], [0, 0.1], [70, 0.1], [0, -0.1], [70, -0.1], [35, 0.1]])
-    error = refusal(of_arrays(left, left - [70, 0]))
-    assert error.code == "degenerate-pair"
-    assert "cannot be separated" in str(error)
-    assert "narrow band" in str(error)
-
-
 def test_a_critical_cylinder_is_refused() -> None:
     """Terrain on a cylinder through both centres, its axis along the base, leaves the elements undetermined."""
     around = np.radians(np.linspace(-27, 27, 7))
@@ -320,13 +312,6 @@ def test_a_pair_on_a_narrow_band_is_warned_of() -> None:
 
 
 # ---------------------------------------------------------------------------------------------- refused
-
-
-def test_the_pair_with_too_few_points_is_the_one_named() -> None:
-    flown = fly(1, 6)
-    wrong_order = (*flown.photos[:2], flown.photos[4], flown.photos[3], *flown.photos[5:])
-    with pytest.raises(GeometryError, match="photos 102 and 105: 0 common points"):
-        collect_pairs(flown.observations, wrong_order, flown.focal)
 
 
 @pytest.mark.parametrize("mirror", [[-1, 1], [1, -1]], ids=["x", "y"])

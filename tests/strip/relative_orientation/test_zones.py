@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.strip.relative_orientation.standard_points import Support, zones
+from photostrip.strip.relative_orientation.standard_points import zones
 from tests.strips import true_pairs
 
 if TYPE_CHECKING:
@@ -27,20 +27,3 @@ def test_points_around_the_standard_positions_have_their_zones(counts: Sequence[
     oriented = flown.orient()
     found = zones(oriented.elements, oriented.pairs).reshape(50, -1)
     assert (found == zone_of(counts)).mean() > 0.995
-
-
-@pytest.mark.parametrize(
-    ("counts", "spare"),
-    [
-        ((1,) * 6, [False] * 6),  # six points: none can go
-        ((2, 1, 1, 1, 1, 1), [True] * 6),  # one zone may become empty
-        ((3, 3, 0, 1, 2, 1), [True, True, False, True, False]),  # a second one may not
-        ((3, 3, 0, 0, 1, 1), [True, True, False, False]),
-    ],
-)
-def test_neither_a_pair_nor_a_second_zone_is_left_without_support(counts: Sequence[int], spare: list[bool]) -> None:
-    number = zone_of(counts)
-    support = Support(number, np.array([counts]))
-    flags = support.spare(np.zeros(len(number), int))
-    by_zone = [bool(flags[number == zone].all()) for zone in np.unique(number)]
-    assert by_zone == spare

@@ -92,22 +92,6 @@ def test_points_come_back_from_their_photos(seed: int) -> None:
     assert found.rays.tolist() == [2 + (n % 3 != 0) for n in range(20)]
 
 
-@pytest.mark.slow
-def test_the_covariance_of_a_point_is_that_of_many_measurements() -> None:
-    xy, photo, point, centers, rotations, points = two_photos(4)
-    sigma = np.full(xy.shape, 0.005)
-    random = np.random.default_rng(2)
-    known = KnownPhotos(centers, rotations, np.full(3, FOCAL))
-    found = [
-        intersect_points(xy + random.normal(size=xy.shape) * sigma, sigma, (photo, point), known, 20)
-        for _ in range(300)
-    ]
-    scatter = np.mean([(each.xyz - points) ** 2 for each in found], axis=0)
-    stated = np.diagonal(found[0].covariance, axis1=1, axis2=2)
-    assert scatter.sum() / stated.sum() == pytest.approx(1, abs=0.08)
-    assert (scatter / stated).mean() == pytest.approx(1, abs=0.08)
-
-
 def published_pair() -> tuple[np.ndarray, ...]:
     """The published pair of variant 56: image points, ground points, stations and rotations, published angles."""
     folder = ROOT / "tests" / "data" / "authorities" / "pair-variant-56"

@@ -143,14 +143,3 @@ def test_a_photo_with_three_points_or_fewer_keeps_its_start(few: int) -> None:
     theirs = one.xy - project(one.points, start, one.photo)
     rows = one.photo == 1
     assert np.allclose(found.residuals[rows], theirs[rows], rtol=0, atol=1e-12)
-
-
-def test_points_in_one_direction_do_not_orient_a_photo() -> None:
-    one = scene(7, [8, 8])
-    points = one.points.copy()
-    points[8:] = points[8]  # all points of the second photo are the same
-    start = one.start(np.random.default_rng(6), metres=20.0, degrees=1.0)
-    found = resect(one.xy, points, one.photo, start)
-    assert found.solved.tolist() == [True, False]
-    assert np.array_equal(found.centers[1], start[0][1])
-    assert np.array_equal(found.rotations[1], start[1][1])

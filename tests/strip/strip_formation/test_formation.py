@@ -11,21 +11,15 @@ import pytest
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.points import PhotoPoints
-from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.strip_formation.scale_transfer import (
-    SCALE_TRANSFERS,
-    StripFormationSettings,
-    mean_ratios,
-    transfer_scale,
-)
-from photostrip.strip.strip_formation.strip import (
-    FirstPhoto,
+from photostrip.strip.formed_strip import (
     FormedStrip,
     _refuse_vertical_base,
     form_from_pairs,
     hand_on_rotations,
 )
+from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.scale_transfer import SCALE_TRANSFERS, StripFormationSettings, mean_ratios, transfer_scale
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
 from tests.vectors import cases
@@ -127,27 +121,6 @@ def test_the_chain_of_the_formula_book(example: Vector) -> None:
     assert np.degrees(np.arcsin(base[2] / given_["base"])) == pytest.approx(expected["nu_deg"], abs=tol)
 
 
-@pytest.mark.parametrize("example", cases("strip_local"))
-def test_the_strip_of_the_formula_book_in_its_own_frame(example: Vector) -> None:
-    """With the angles of the first photo and the length of the first base printed coordinates come out as they are."""
-    observations = measured({f"{number}": image for number, image in enumerate(example.input["photos"], start=1)})
-    names, tol = observations.photo_ids, example.tol
-    oriented = orient_pairs(collect_pairs(observations, names, example.input["f"]), names)
-    first = FirstPhoto(attitude(example.input["eo1_deg"])[0], example.input["base"])
-    strip = form_from_pairs(oriented, StripFormationSettings("distances", intersection="left"), names, first=first)
-    for number, model in nonempty(enumerate(example.expected["models"])):
-        assert np.degrees(strip.base_direction[number]) == pytest.approx(model["tau_deg"], abs=tol["angles_deg"])
-        assert np.degrees(strip.base_inclination[number]) == pytest.approx(model["nu_deg"], abs=tol["angles_deg"])
-        assert strip.scale_factor[number] == pytest.approx(model["k"], abs=tol["k"])
-    for number, camera in nonempty(enumerate(example.expected["cameras"])):
-        degrees = np.degrees(alpha_omega_kappa(strip.rotations[number]))
-        assert np.allclose(degrees, camera["alpha_omega_kappa_deg"], rtol=0, atol=tol["angles_deg"])
-        assert np.allclose(strip.centers[number], camera["S"], rtol=0, atol=tol["coords"])
-    for number, xyz in nonempty(zip(strip.point.tolist(), strip.xyz, strict=True)):
-        expected = example.expected["points"][observations.point_ids[number]]
-        assert np.allclose(xyz, expected, rtol=0, atol=tol["coords"])
-
-
 def oriented_as(elements: Floats, points: int = 6) -> Orientation:
     """Pairs of given elements; what was measured is not looked at."""
     p = len(elements)
@@ -208,25 +181,6 @@ def test_strips_without_noise_close(transfer: str) -> None:
 
 
 # ------------------------------------------------------------------------------------------ with noise
-
-
-def scale_errors(overlap: float, transfer: str, strips: int = 40) -> float:
-    """Root mean square relative error of a scale ratio between neighbouring models."""
-    squares = []
-    for seed in range(strips):
-        flown = fly(seed, 6, overlap=overlap, sigma=5 * MICROMETRE, extra=15)
-        true = np.linalg.norm(np.diff(flown.centers, axis=0), axis=1)
-        found = formed(flown, transfer).junctions.factor
-        squares.append(((found * true[:-1] / true[1:] - 1) ** 2).mean())
-    return float(np.sqrt(np.mean(squares)))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("overlap", [0.62, 0.8])
-def test_both_transfers_are_equally_good_over_all_common_points(overlap: float) -> None:
-    least_squares, distances = (scale_errors(overlap, transfer) for transfer in SCALE_TRANSFERS)
-    assert 1e-4 < least_squares < 8e-4
-    assert least_squares / distances == pytest.approx(1, abs=0.03)
 
 
 @TRANSFERS

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.strip.strip_formation.intersection import intersect
+from photostrip.strip.intersection import intersect
 from tests.loops import nonempty
 from tests.strips import attitude, photograph
 from tests.vectors import cases
@@ -82,28 +82,3 @@ def test_with_errors_x_and_z_solve_the_two_equations(seed: int) -> None:
         heights = s * left[1, n], base[1] + t * right[1, n]
         assert found.xyz[n, 1] == pytest.approx(np.mean(heights), abs=1e-9)
         assert found.gap[n] == pytest.approx(heights[0] - heights[1], abs=1e-9)
-
-
-@pytest.mark.parametrize("left_ray", [True, False])
-def test_a_base_along_y_meets_as_one_along_x(left_ray: bool) -> None:
-    """Frame and photos turned by a quarter: the point turns with them, and the gap changes its sign."""
-    _, base, left, right = scene(4)
-    left = left + np.random.default_rng(4).normal(0, 0.05, left.shape)
-    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    one = intersect(base, left, right, FOCAL, left_ray=left_ray)
-    two = intersect(quarter @ base, quarter @ left, quarter @ right, FOCAL, left_ray=left_ray)
-    assert np.allclose(two.xyz, one.xyz @ quarter.T, rtol=0, atol=1e-11 * 100)
-    assert np.allclose(two.gap, -one.gap, rtol=0, atol=1e-11 * 100)
-    assert np.abs(one.gap).max() > 0.01
-
-
-def test_rays_that_do_not_meet_are_marked() -> None:
-    left = np.array([[30.0, 0, -100], [30, 0, -100], [-30, 0, -100], [30, 0, 100], [30, 0, -100], [30, 0, -100]]).T
-    right = np.array(
-        [[-35.0, 0, -100], [30, 0, -100], [30, 0, -100], [-35, 0, -100], [-35, 0, 100], [30 - 9e-5, 0, -100]]
-    ).T
-    found = intersect(np.array([1.0, 0, 0]), left, right, FOCAL)
-    # meets; parallel; spreads; left ray looks up; right ray looks up; parallel to a millionth
-    assert found.sound.tolist() == [True, False, False, False, False, False]
-    assert np.isfinite(found.xyz[0]).all()
-    assert np.isnan(found.xyz[1:]).all()

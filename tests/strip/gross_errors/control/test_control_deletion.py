@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,21 +15,16 @@ from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.strip.absolute_orientation import Targets
+from photostrip.strip.control_screening import FoundErrors, reliability
+from photostrip.strip.control_search import StripAtControl, adjust
 from photostrip.strip.fitted_strip import Misclosures
-from photostrip.strip.gross_errors.control_screening import FoundErrors, reliability
-from photostrip.strip.gross_errors.control_search import StripAtControl, adjust
-from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline.results import Result
-    from photostrip.strip.gross_errors.control_search import JointAdjustment
-    from tests.strips import Flown
+    from photostrip.strip.control_search import JointAdjustment
 
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.float64]
@@ -153,30 +148,3 @@ def test_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None
     after, _, sigma = squares(strip, (5,))
     limit = np.sqrt(f_distribution.isf(whole.level, 1, 16))
     assert detectable[1, 2] == pytest.approx((limit + norm.ppf(0.8)) * sigma[0] * max(1, after / 16) ** 0.5, rel=1e-5)
-
-
-# ---------------------------------------------------------------------------------------------------------- strips
-
-
-def adjusted(strip: Flown, names: tuple[str, ...], wrong: dict[str, tuple[float, float, float]]) -> Result:
-    rng = np.random.default_rng(7)
-    given_ = {name: strip.xyz[strip.at[name]] + rng.normal(0, 0.02, 3) for name in names}
-    for name, error in wrong.items():
-        given_[name] = given_[name] + error
-    return triangulate(project(strip, control_points(given_, sigma=0.02)), Settings(adjustment="polynomial"))
-
-
-def flown(seed: int = 1) -> Flown:
-    return fly(seed, 13, sigma=5 * MICROMETRE, extra=60)
-
-
-@pytest.mark.slow
-def test_a_bend_takes_no_good_control() -> None:
-    """A bend that no random error explains: polynomials take it, and the good control stays."""
-    strip = flown()
-    names = strip.bands(0, 3, 6, 9, 12)
-    along = (strip.xyz[:, 0] - strip.xyz[:, 0].mean()) / np.ptp(strip.xyz[:, 0])
-    bent = replace(strip, xyz=strip.xyz + np.column_stack([0 * along, 0 * along, 400.0 * along**2]))
-    assert not adjusted(bent, names, {}).strips[0].wrong_control
-    found = adjusted(bent, names, {"p6_1": (0.0, 0.0, 8.0)}).strips[0].wrong_control
-    assert [names[each.row] for each in found] == ["p6_1"]

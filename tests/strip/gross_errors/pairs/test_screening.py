@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.statistics import grubbs_limit
-from photostrip.strip.gross_errors import pair_screening
+from photostrip.strip import pair_screening
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, assess_pairs, orient_pairs
 from photostrip.strip.relative_orientation.pairs import collect_pairs
 from photostrip.strip.relative_orientation.solution import solve_elements
@@ -49,10 +49,6 @@ def spoiled(truth: TruePairs, errors: dict[int, float]) -> Orientation:
     shape = (truth.pairs.size, -1, 2)
     pairs = batch(left.reshape(shape), truth.pairs.right.reshape(shape), truth.pairs.focal)
     return TruePairs(pairs, truth.base, truth.rotation).orient()
-
-
-def rows_of(log: Log) -> list[int]:
-    return [entry.row for entry in log]
 
 
 # ------------------------------------------------------------------------------------------- published
@@ -160,20 +156,6 @@ def test_false_alarms_of_clean_models(method: str, share: float) -> None:
 
 
 # ---------------------------------------------------------------------------------------- what is found
-
-
-@pytest.mark.parametrize("method", ["parallax+grubbs", "tau"])
-def test_one_large_error_is_found_alone(method: str) -> None:
-    truth = clean(3, 5)
-    oriented = spoiled(truth, {20: 1.0})
-    found, log = screened(oriented, RelativeSettings(method), SIGMA)
-    assert rows_of(log) == [20]
-    entry = log[0]
-    assert entry.value > entry.limit > 0
-    assert entry.worst == found.parallax[20]  # what the pair leaves of it without the point
-    assert not found.used[20]
-    assert found.points_used.tolist() == [16, 15, 16, 16, 16]
-    assert np.abs(found.parallax[found.used]).max() < 6 * SIGMA
 
 
 def test_the_automatic_limit_is_four_sigma_of_a_parallax() -> None:

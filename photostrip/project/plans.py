@@ -1,0 +1,798 @@
+"""The files of ``photostrip plan``: keys of each kind, and the specifications of ``planning`` made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from photostrip.camera import Camera
+from photostrip.errors import InputError
+from photostrip.formats.text.findings import suggestion
+from photostrip.planning import camera_efficiency
+from photostrip.planning.ideal_strip import BUNDLE, LEAST_PHOTOS, METHODS, USES, ControlLayout, Spot, StripGeometry
+from photostrip.planning.ideal_strip import LAYOUTS as STRIP_LAYOUTS
+from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
+from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
+from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
+from photostrip.project.conversion import distortion_of
+from photostrip.project.phototheodolites import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
+from photostrip.project.phototheodolites import Camera as Phototheodolite
+from photostrip.project.schema.cameras import Distortion
+from photostrip.project.schema.sections import (
+    After,
+    Before,
+    FirstSchema,
+    Flag,
+    Fraction,
+    Id,
+    NotNegative,
+    Number,
+    Pair,
+    Positive,
+    Range,
+    Section,
+    Triple,
+    Whole,
+    Words,
+    bounded,
+    choice,
+    key,
+    length,
+    one_of,
+    rule,
+    wrong,
+)
+from photostrip.project.simulation import SimulatedCamera, camera_of
+from photostrip.project.yaml.reading import Reading, read_keys, valid_section
+from photostrip.simulation import Points
+from photostrip.strip.relative_orientation.orientation import SCREENINGS
+from photostrip.terrestrial.accuracy import DisplacementSpec
+from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
+
+OVERLAP = Range(1.0, 99.0, "%")
+
+Percent = Annotated[Positive, After(bounded(OVERLAP))]
+SigmaUm = Annotated[Positive, After(bounded(IMAGE_SIGMA_UM))]
+
+
+def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Require three standard deviations that are not negative, at least one of them positive."""
+    if min(value) < 0 or max(value) == 0:
+        raise wrong("standard deviations are negative or all zero", code="range", expected="metres, 0 or more")
+    return value
+
+
+Sigmas = Annotated[Triple, After(all_positive)]
+
+
+class Flown(Section):
+    """A plan of something that is flown: camera, overlap, scale, measuring."""
+
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    camera: SimulatedCamera = key("Camera; its lens counts as ideal", SimulatedCamera())
+    end_lap_percent: Percent = key("Overlap of neighbouring photos", StripGeometry.end_lap_percent, unit="%")
+    scale: Positive | None = key("Denominator of the photo scale; default: 10000", None)
+    flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
+    image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
+
+    @rule
+    def _one_scale(self) -> None:
+        if self.scale is not None and self.flying_height is not None:
+            raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
+
+    def scale_of(self, camera: Camera) -> float:
+        """Denominator of the photo scale, given itself or by the flying height."""
+        by_height = (self.flying_height or 0.0) / camera.principal_distance * 1000.0
+        return self.scale or by_height or StripGeometry.scale
+
+
+POINT_USES = ("xyz", "xy", "z")
+REACH = Range(5.0, 100.0, "%")
+GRID_POINTS = Range(2, 101, "points")
+ZONE_POINTS = Range(1, 1000, "points")
+RELIEF = 0.9  # of the flying height: what stands higher is no ground
+PLACE = "x along the base and y to the left on the ground, from the left nadir, at photo scale"
+
+
+class ModelPoint(Section):
+    """A point whose errors are wanted."""
+
+    name: Id = key("Name")
+    at: Pair = key(PLACE, unit="mm")
+    height: Number = key("Height above the level to which the photo scale belongs", 0.0, unit="m")
+    measured_error: Triple = key("Error of the measured model coordinates", NO_ERROR, unit="m")
+
+
+class ModelControlPoint(ModelPoint):
+    """One control point."""
+
+    name: Id = key("Name; default: C and its number", "")
+    use: Annotated[Words, After(one_of(*POINT_USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    misclosure: Triple | None = key("Model minus given, where it has been measured", None, unit="m")
+    given_error: Triple = key("Error of the given coordinates", NO_ERROR, unit="m")
+
+
+class ElementErrors(Section):
+    """Given errors of the elements of the right photo, the left one held."""
+
+    dby_um: Number = key("Perspective centre to the left, at photo scale", 0.0, unit="um")
+    dbz_um: Number = key("Perspective centre upwards, at photo scale", 0.0, unit="um")
+    dkappa_arcsec: Number = key("Turn, counter-clockwise", 0.0, unit="arcsec")
+    dalpha_arcsec: Number = key("Turn, to look forward", 0.0, unit="arcsec")
+    domega_arcsec: Number = key("Turn, to look to the left", 0.0, unit="arcsec")
+
+
+def _control_point(value: object) -> object:
+    """Let a pair of numbers stand for a point that is given in full."""
+    return {"at": value} if isinstance(value, list) else value
+
+
+class ModelControl(Section):
+    """The control of the model."""
+
+    layout: Annotated[Words, After(one_of(*LAYOUTS))] = key(
+        "`corners`, `corners+centre`, or `six` standard points", "corners"
+    )
+    points: list[Annotated[ModelControlPoint, Before(_control_point)]] = key(
+        "Points instead of a layout: [x, y], or {at: [x, y], use: z}", []
+    )
+    sigma: Sigmas = key("Standard deviations along, across and in height", ModelSpec.control_sigma, unit="m")
+
+
+class ModelOrientation(Section):
+    """The points that orient the pair."""
+
+    zone_points: Annotated[Whole, After(bounded(ZONE_POINTS))] = key("Points in each of six zones", 1)
+    points: list[Pair] = key("Points instead of zones: [x, y], from the left nadir", [], unit="mm")
+
+
+class Grid(Section):
+    """Where errors are computed."""
+
+    columns: Annotated[Whole, After(bounded(GRID_POINTS))] = key("Points along the base", ModelSpec.grid[0])
+    rows: Annotated[Whole, After(bounded(GRID_POINTS))] = key("Points across the flight", ModelSpec.grid[1])
+
+
+def _listed(value: object) -> object:
+    """Let a list stand for the five elements."""
+    if not isinstance(value, list):
+        return value
+    names = list(ElementErrors.model_fields)
+    if len(value) != len(names):
+        expected = "five: dby, dbz (um), dkappa, dalpha, domega (seconds of arc)"
+        raise wrong(f"{len(value)} values are given", code="number", expected=expected)
+    return dict(zip(names, value, strict=True))
+
+
+class ModelPlanFile(Flown):
+    """Expected errors over one model. Every key but the first has a default."""
+
+    photostrip_plan_model: FirstSchema = key("Number of this schema: 1")
+    name: Words = key("Name of the plan", "model")
+    base: Positive | None = key("Photo base, instead of the overlap", None, unit="mm")
+    reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
+        "Outermost points, of half the width of the photo", 80.0, unit="%"
+    )
+    orientation: ModelOrientation = key("Points that orient the pair", ModelOrientation())
+    control: ModelControl = key("Control", ModelControl())
+    grid: Grid = key("Where errors are computed", Grid())
+    points: list[ModelPoint] = key("Further points, with names and heights", [])
+    element_errors: Annotated[ElementErrors, Before(_listed)] = key(
+        "Given errors of the elements: by name, or [dby, dbz, dkappa, dalpha, domega]", ElementErrors()
+    )
+    closed_form: Annotated[Words, After(one_of("no", "yes", "printed"))] = key(
+        "Operators and closed form side by side, with c1 to c15; `printed`: as the source prints it, misprints and all",
+        "no",
+    )
+
+    @rule
+    def _errors_or_misclosures(self) -> None:
+        measured = [point for point in self.control.points if point.misclosure is not None]
+        if not measured:
+            return
+        if len(measured) < len(self.control.points):
+            message = "some control points have a misclosure, and others have none"
+            raise wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
+        every: list[ModelPoint] = [*self.control.points, *self.points]
+        made = [point for point in every if any(point.measured_error)]
+        if made or any(any(point.given_error) for point in measured) or any(dict(self.element_errors).values()):
+            message = "misclosures that were found, and errors that would make some, are both given"
+            raise wrong(message, code="two-keys", at="control", fix="remove the one or the other")
+
+    @rule
+    def _points_are_seen(self) -> None:
+        camera = camera_of(self.camera)
+        flying_height = self.scale_of(camera) * camera.principal_distance / MILLIMETRES
+        for name, points in (("control", self.control.points), ("points", self.points)):
+            highest = max((point.height for point in points), default=0.0)
+            if highest > RELIEF * flying_height:
+                message = f"a point {highest:g} m high is not seen from {flying_height:g} m"
+                raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
+
+
+class ModelPlan(NamedTuple):
+    name: str
+    camera: str
+    spec: ModelSpec
+    closed_form: str  # ``no``, ``yes`` or ``printed``
+    files: Sequence[str]
+
+
+def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
+    """Read the plan of a model, or raise all its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_keys(ModelPlanFile, path, assignments)
+    camera = camera_of(given.camera)
+    along, across = camera.format or (230.0, 230.0)
+    base = given.base or along * (1.0 - given.end_lap_percent / 100.0)
+    width = across / 2.0 * given.reach_percent / 100.0
+    points = tuple(_control_of(point, number) for number, point in enumerate(given.control.points, 1))
+    scale = given.scale_of(camera)
+    spec = ModelSpec(
+        focal=camera.principal_distance,
+        base=base,
+        width=width,
+        scale=scale,
+        image_sigma=given.image_sigma_um / MICROMETRES,
+        zone_points=given.orientation.zone_points,
+        orientation_points=tuple(given.orientation.points),
+        control=points or control_layout(str(given.control.layout), base, width),
+        control_sigma=given.control.sigma,
+        grid=(given.grid.columns, given.grid.rows),
+        points=tuple(
+            NamedPoint(point.at, name=str(point.name), height=point.height, measured_error=point.measured_error)
+            for point in given.points
+        ),
+        element_errors=_element_errors(given.element_errors),
+    )
+    return ModelPlan(
+        name=str(given.name), camera=camera.name, spec=spec, closed_form=str(given.closed_form), files=reading.files
+    )
+
+
+def _control_of(point: ModelControlPoint, number: int) -> ControlPoint:
+    return ControlPoint(
+        at=point.at,
+        use=str(point.use),
+        name=str(point.name or f"C{number}"),
+        height=point.height,
+        misclosure=point.misclosure,
+        measured_error=point.measured_error,
+        given_error=point.given_error,
+    )
+
+
+def _element_errors(given: ElementErrors) -> tuple[float, ...]:
+    lengths = (given.dby_um / MICROMETRES, given.dbz_um / MICROMETRES)
+    angles = (given.dkappa_arcsec, given.dalpha_arcsec, given.domega_arcsec)
+    return (*lengths, *(angle / ARCSECONDS for angle in angles))
+
+
+MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
+ROWS = Range(2, 20, "rows")
+EXTRA = Range(0, 200, "points")
+PLACED = Range(1, 40, "points")
+ROW_REACH = Range(5.0, 95.0, "%")
+USUAL_POINTS, USUAL_LAYOUT = StripGeometry.points, ControlLayout("")
+# Keys of a simulation by which the strip is refused, and those of the plan.
+SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
+DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
+
+
+class StripPoints(Section):
+    """Pass points."""
+
+    rows: Annotated[Whole, After(bounded(ROWS))] = key("Points across the flight at each nadir", USUAL_POINTS.rows)
+    reach_percent: Annotated[Positive, After(bounded(ROW_REACH))] = key(
+        "Outermost rows, of half the width of the photo", USUAL_POINTS.reach_percent, unit="%"
+    )
+    extra_per_model: Annotated[Whole, After(bounded(EXTRA))] = key(
+        "Further points in each model", USUAL_POINTS.extra_per_model
+    )
+
+
+class StripSpot(Section):
+    """One control point."""
+
+    at: tuple[Whole, Whole] = key("Photo at whose nadir it lies, and row from left to right, both counted from 1")
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+
+
+def _spot(value: object) -> object:
+    """Let photo and row stand for a point that is given in full."""
+    return {"at": value} if isinstance(value, list) else value
+
+
+def _layout(value: object) -> object:
+    """Let a word stand for a layout: ``corners``, ``bands=3``, ``every=4``."""
+    if not isinstance(value, str) or not value:
+        return value
+    name, equals, number = value.partition("=")
+    return {name.strip(): number.strip()} if equals else {"layout": value}
+
+
+def _layouts(value: object) -> object:
+    """Let a list of words stand for layouts, each by a name of its own: ``3 bands``, ``every 5``, ``corners``."""
+    if not isinstance(value, list):
+        return value
+    return {_layout_name(str(word)): word for word in value}
+
+
+def _layout_name(word: str) -> str:
+    kind, equals, number = word.partition("=")
+    if not equals:
+        return word
+    return f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
+
+
+def _required(value: object) -> object:
+    """Let a pair stand for plan and height."""
+    return dict(zip(("plan", "height"), value, strict=False)) if isinstance(value, list) else value
+
+
+class StripLayout(Section):
+    """One layout of control."""
+
+    layout: Annotated[Words, After(one_of(*STRIP_LAYOUTS))] = key(
+        "`bands`, `corners`, `corners+centre`, or `points` alone", USUAL_LAYOUT.kind
+    )
+    bands: Whole = key("Bands across the strip, from the first to the last photo", USUAL_LAYOUT.bands)
+    every: Annotated[Whole, After(bounded(Range(1, 400, "models")))] | None = key(
+        "Models from band to band, instead of `bands`", None
+    )
+    per_band: Whole = key("Points of a band", USUAL_LAYOUT.per_band)
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
+    points: list[Annotated[StripSpot, Before(_spot)]] = key(
+        "Single points, further ones or instead of a band's: [photo, row], or {at: [photo, row], use: z}", []
+    )
+    sigma: Sigmas | None = key("Standard deviations along, across, in height; default: `control_sigma`", None, unit="m")
+    gnss: Sigmas | None = key(
+        "Standard deviations of measured perspective centres; default: none are measured", None, unit="m"
+    )
+    gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
+
+    @rule
+    def _one_way_to_space_bands(self) -> None:
+        if self.every is not None and "bands" in self.model_fields_set:
+            raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
+
+
+class StripRequired(Section):
+    """The accuracy that every point must reach."""
+
+    plan: Positive | None = key("Standard deviation in plan, both coordinates together", None, unit="m")
+    height: Positive | None = key("Standard deviation in height", None, unit="m")
+
+
+class StripPlacement(Section):
+    """Further control points to be placed as well as possible."""
+
+    points: Annotated[Whole, After(bounded(PLACED))] = key("How many")
+    into: Id | None = key("Layout that they are added to; default: the first", None)
+    method: Annotated[Words, After(one_of(*METHODS))] = key("Method of adjustment", METHODS[-1])
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+
+
+class StripPlanFile(Flown):
+    """A strip and layouts of its control. Every key but the first has a default."""
+
+    photostrip_plan_strip: FirstSchema = key("Number of this schema: 1")
+    name: Words = key("Name of the plan", "strip")
+    models: Annotated[Whole, After(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
+    points: StripPoints = key("Pass points", StripPoints())
+    control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
+    gnss: Sigmas | None = key(
+        "Standard deviations of measured perspective centres: each layout is compared with and without them",
+        None,
+        unit="m",
+    )
+    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], Before(_layouts), length(1)] | None = key(
+        "Layouts by name, where a word may stand for one, or a list of words: `[bands=3, every=5, corners]`."
+        f" Default: {', '.join(DEFAULT_LAYOUTS)}",
+        None,
+    )
+    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], length(1)] = key(
+        f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
+    )
+    required: Annotated[StripRequired, Before(_required)] = key(
+        "Accuracy that every point must reach, or [plan, height]", StripRequired()
+    )
+    place: StripPlacement | None = key("Further points to be placed as well as possible", None)
+
+    @rule
+    def _names_and_methods_fit(self) -> None:
+        into = self.place.into if self.place is not None else None
+        names = list(self.layouts or DEFAULT_LAYOUTS)
+        if into is not None and into not in names:
+            message = f"there is no layout `{into}` that points could be added to"
+            fix = suggestion(into, names)
+            raise wrong(message, code="unknown-layout", at="place", expected=f"one of {', '.join(names)}", fix=fix)
+        measured = self.gnss is not None or any(each.gnss is not None for each in (self.layouts or {}).values())
+        if measured and BUNDLE not in self.methods:
+            message = "measured perspective centres are of use to the bundle alone, which is not among the methods"
+            raise wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
+
+
+@dataclass(frozen=True, eq=False)
+class StripPlan:
+    name: str
+    design: DesignTask
+    reading: Reading
+
+    def computed(self) -> DesignReport:
+        """Compute what the plan asks for, or raise all that cannot be planned, each fault at its place in the file."""
+        with self.reading.places(SIMULATED):
+            return plan_strip(self.design)
+
+
+def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
+    """Read the plan of a strip, or raise all its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_keys(StripPlanFile, path, assignments)
+    camera = camera_of(given.camera)
+    geometry = StripGeometry(
+        camera=camera,
+        photos=given.models + 1,
+        end_lap_percent=given.end_lap_percent,
+        scale=given.scale_of(camera),
+        points=Points(
+            rows=given.points.rows,
+            reach_percent=given.points.reach_percent,
+            scatter_percent=0.0,
+            extra_per_model=given.points.extra_per_model,
+        ),
+        image_sigma=given.image_sigma_um / 1000.0,
+    )
+    usual = {name: valid_section(StripLayout, _layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
+    chosen = [(name, each) for name, each in (given.layouts or usual).items() if each is not None]
+    layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
+    if given.gnss is not None:
+        plain = [layout for layout in layouts if layout.gnss is None]
+        layouts += tuple(replace(each, name=f"{each.name} + GNSS", gnss=given.gnss) for each in plain)
+    placement = None
+    if given.place is not None:
+        into = str(given.place.into) if given.place.into is not None else layouts[0].name
+        placement = Placement(
+            points=given.place.points, into=into, method=str(given.place.method), use=str(given.place.use)
+        )
+    methods = tuple(dict.fromkeys(str(method) for method in given.methods))
+    required = Demand(given.required.plan, given.required.height)
+    return StripPlan(
+        str(given.name),
+        DesignTask(geometry=geometry, layouts=layouts, methods=methods, required=required, placement=placement),
+        reading,
+    )
+
+
+def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> ControlLayout:
+    return ControlLayout(
+        name=name,
+        kind=str(given.layout),
+        bands=given.bands,
+        every=given.every,
+        per_band=given.per_band,
+        use=str(given.use),
+        spots=tuple(Spot(spot.at[0], spot.at[1], str(spot.use)) for spot in given.points),
+        sigma=given.sigma or sigma,
+        gnss=given.gnss,
+        gnss_offset=given.gnss_offset,
+    )
+
+
+Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
+Relief = Annotated[Number, After(bounded(Range(0.0, 9000.0, "m")))]
+Slope = Annotated[Number, After(bounded(Range(0.0, 89.0, "deg")))]
+FLIGHTS = ("scale", "flying_height", "height_sigma")
+
+
+class PlanCamera(Section):
+    """One camera to compare."""
+
+    principal_distance: Positive = key("Principal distance", unit="mm")
+    sigma_um: SigmaUm | None = key("Standard deviation of an x parallax in the photo", None, unit="um")
+    image_sigma_um: SigmaUm | None = key(
+        "Standard deviation of an image coordinate, instead of that of a parallax", None, unit="um"
+    )
+    mean_distortion_um: Positive | None = key("Mean size of the radial distortion that is left", None, unit="um")
+    distortion: Distortion | None = key("The distortion that is left, instead of its mean size", None)
+    base: Positive | None = key("Photo base; default: from `format` and the overlap", None, unit="mm")
+    format: tuple[Positive, Positive] | None = key("Length along and width across the flight", None, unit="mm")
+
+    @rule
+    def _has_a_base(self) -> None:
+        if self.base is None and self.format is None:
+            raise wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
+
+    @rule
+    def _has_one_precision(self) -> None:
+        if (self.sigma_um is None) == (self.image_sigma_um is None):
+            what = "nothing says" if self.sigma_um is None else "two keys say"
+            message = f"{what} how well an x parallax is known"
+            raise wrong(message, code="missing-key", expected="`sigma_um` or `image_sigma_um`")
+        left = [name for name in ("mean_distortion_um", "distortion") if getattr(self, name) is not None]
+        if left and self.sigma_um is not None:
+            message = f"`{left[0]}` adds to the errors of measuring, and `sigma_um` has all errors in it"
+            raise wrong(message, code="two-keys", at=left[0], fix="give `image_sigma_um` instead of `sigma_um`")
+        if len(left) > 1:
+            message = "the distortion that is left and its mean size are both given"
+            raise wrong(message, code="two-keys", at=left[0], fix="remove one")
+        if self.distortion is not None and self.format is None:
+            message = "where the distortion lies in a model follows from the format, which is not given"
+            raise wrong(message, code="missing-key", at="distortion", expected="`format`")
+
+
+class CameraPlanFile(Section):
+    """Cameras to compare."""
+
+    photostrip_plan_cameras: FirstSchema = key("Number of this schema: 1")
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    name: Words = key("Name of the comparison", "cameras")
+    end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
+    side_lap_percent: Lap = key("Overlap of neighbouring strips: what is left of the width is useful", 0.0, unit="%")
+    scale: Positive | None = key("Denominator of the photo scale that all are flown at", None)
+    flying_height: Positive | None = key("Height above the ground that all are flown at, instead", None, unit="m")
+    height_sigma: Positive | None = key("Standard deviation that heights shall have, instead", None, unit="m")
+    relief: Relief = key("Difference between the highest and the lowest ground", 0.0, unit="m")
+    slope_deg: Slope = key("Steepest slope that is to be seen", 0.0, unit="deg")
+    reference: Id | None = key("Camera that the others stand beside; default: the last", None)
+    cameras: Annotated[dict[Id, PlanCamera], length(1)] = key("Cameras by name")
+
+    @rule
+    def _reference_is_there(self) -> None:
+        if self.reference is not None and self.reference not in self.cameras:
+            expected = f"one of {', '.join(self.cameras)}"
+            raise wrong(
+                f"there is no camera `{self.reference}`", code="unknown-camera", at="reference", expected=expected
+            )
+        wide = [name for name, camera in self.cameras.items() if camera.format is not None]
+        if wide and len(wide) < len(self.cameras):
+            lacking = next(name for name in self.cameras if name not in wide)
+            message = f"camera `{lacking}` has no format, and others have: areas cannot be compared"
+            raise wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
+
+    @rule
+    def _flown_one_way(self) -> None:
+        given = [name for name in FLIGHTS if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise wrong(f"`{given[0]}` and `{given[1]}` are both given", code="two-keys", at=given[1], fix="remove one")
+        ground = [name for name in ("relief", "slope_deg") if getattr(self, name)]
+        if ground and not given:
+            message = "what a camera takes of a terrain depends on how it is flown"
+            raise wrong(
+                message, code="missing-key", at=ground[0], expected="`scale`, `flying_height` or `height_sigma`"
+            )
+        if self.relief and any(camera.format is None for camera in self.cameras.values()):
+            message = "how far photos overlap on high ground follows from their format, which is not given"
+            raise wrong(message, code="missing-key", at="relief", fix="give `format` for all cameras")
+
+
+class CameraPlan(NamedTuple):
+    name: str
+    cameras: tuple[camera_efficiency.ComparedCamera, ...]
+    reference: camera_efficiency.ComparedCamera
+    survey: camera_efficiency.FlownSurvey | None  # nothing where only the cameras are compared
+    files: Sequence[str]
+
+
+def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
+    """Read a list of cameras to compare, or raise every fault of it."""
+    given, reading = read_keys(CameraPlanFile, path, assignments)
+    cameras = tuple(_compared(str(name), each, given) for name, each in given.cameras.items())
+    named = {camera.name: camera for camera in cameras}
+    return CameraPlan(
+        name=str(given.name),
+        cameras=cameras,
+        reference=named.get(str(given.reference), cameras[-1]),
+        survey=_survey(given),
+        files=reading.files,
+    )
+
+
+def _survey(given: CameraPlanFile) -> camera_efficiency.FlownSurvey | None:
+    if all(getattr(given, name) is None for name in FLIGHTS):
+        return None
+    return camera_efficiency.FlownSurvey(
+        scale=given.scale,
+        flying_height=given.flying_height,
+        height_sigma=given.height_sigma,
+        terrain=camera_efficiency.HighGround(given.relief, float(np.radians(given.slope_deg))),
+    )
+
+
+def _compared(name: str, given: PlanCamera, plan: CameraPlanFile) -> camera_efficiency.ComparedCamera:
+    # without a format all cameras count as equally wide
+    length, width = given.format or (None, camera_efficiency.PRINTED_BASE)
+    base = given.base
+    if base is None and length is not None:
+        base = length * (1.0 - plan.end_lap_percent / 100.0)
+    useful = width * (1.0 - plan.side_lap_percent / 100.0)
+    return camera_efficiency.ComparedCamera(
+        name=name,
+        focal=given.principal_distance,
+        sigma=_sigma(name, given, base or np.nan, useful),
+        base=base or np.nan,
+        width=useful,
+        length=length,
+    )
+
+
+def _sigma(name: str, given: PlanCamera, base: float, width: float) -> float:
+    """Return m_p, mm."""
+    if given.sigma_um is not None:
+        return given.sigma_um / MICROMETRES
+    measuring = (given.image_sigma_um or 0.0) / MICROMETRES
+    if given.distortion is None or given.format is None:
+        mean = (given.mean_distortion_um or 0.0) / MICROMETRES
+        return camera_efficiency.sigma_from_mean_distortion(measuring, mean)
+    try:
+        return camera_efficiency.sigma_from_distortion(
+            measuring, distortion_of(given.distortion), base=base, length=given.format[0], width=width
+        )
+    except InputError as error:
+        raise InputError(replace(fault, key=f"cameras.{name}.distortion") for fault in error.faults) from None
+
+
+PRESET = "UMK 10/1318"
+CONVERGENCE = Range(-45.0, 45.0, "deg")
+POWER = Range(0.5, 0.9999, "")
+Metres = Annotated[Number, After(bounded(DISTANCE))]
+
+
+class DisplacementPlanFile(Section):
+    """Expected accuracy of displacements. Every key but the first has a default."""
+
+    photostrip_plan_displacement: FirstSchema = key("Number of this schema: 1")
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    name: Words = key("Name of the plan", "displacements")
+    camera: CameraOrName = key(
+        "Camera: its name in a list, or preset, principal_distance, format", Phototheodolite(preset=PRESET)
+    )
+    presets: Words | None = key("A list of cameras of your own", None)
+    stations: Annotated[Words, After(one_of("2", "1"))] = key(
+        "2, at the ends of a base, or 1, with known distances", "2"
+    )
+    base: Annotated[Number, After(bounded(BASE))] = key("Length of the base", 20.0, unit="m")
+    convergence_deg: Annotated[Number, After(bounded(CONVERGENCE))] = key(
+        "Turn of each camera towards the other", 0.0, unit="deg"
+    )
+    distances: Annotated[list[Metres], length(1, 50)] = key(
+        "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
+    )
+    sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
+    sigma_d_um: SigmaUm | None = key("That of a pseudo-parallax, instead; default: 5", None, unit="um")
+    significance: Annotated[Fraction, After(bounded(SIGNIFICANCE))] = key(
+        "Probability of calling a point moved that did not move", DisplacementSpec.significance
+    )
+    power: Annotated[Fraction, After(bounded(POWER))] = key(
+        "Probability with which the displacements stated are found", DisplacementSpec.power
+    )
+
+    @rule
+    def _one_precision(self) -> None:
+        if self.sigma_um is not None and self.sigma_d_um is not None:
+            message = "the standard deviation of a coordinate and that of a pseudo-parallax are both given"
+            raise wrong(message, code="two-keys", at="sigma_d_um", fix="remove one")
+        if self.stations == "1" and self.convergence_deg:
+            raise wrong("one camera has no other to be turned towards", at="convergence_deg", fix="remove it")
+
+
+class DisplacementPlan(NamedTuple):
+    name: str
+    spec: DisplacementSpec
+    files: Sequence[str]
+
+
+def load_displacement_plan(path: Path | None, assignments: Sequence[str]) -> DisplacementPlan:
+    """Read the plan of a survey, or raise its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_keys(DisplacementPlanFile, path, assignments)
+    camera = only_camera(given.camera, reading, whole=True)
+    change = given.sigma_d_um or 5.0
+    if given.sigma_um is not None:
+        change = float(np.sqrt(2.0)) * given.sigma_um  # of a coordinate in two epochs
+    spec = DisplacementSpec(
+        camera,
+        distances=tuple(given.distances),
+        sigma=change / MICROMETRES,
+        base=given.base if given.stations == "2" else None,
+        convergence=float(np.radians(given.convergence_deg)),
+        significance=given.significance,
+        power=given.power,
+    )
+    return DisplacementPlan(name=str(given.name), spec=spec, files=reading.files)
+
+
+USUAL_SCREENING = ScreeningSpec()
+PAIR_FOCAL, LENGTH = Range(10.0, 1000.0, "mm"), Range(1.0, 500.0, "mm")
+TILT, PAIR_RELIEF = Range(0.0, 10.0, "deg"), Range(0.0, 50.0, "%")
+POINTS, PAIRS = Range(0, 100, ""), Range(1, 1000, "")
+REPETITIONS = Range(1, 1000, "")
+
+Size = Annotated[Number, After(bounded(LENGTH))]
+Count = Annotated[Whole, After(bounded(POINTS))]
+
+
+class ScreeningPlanFile(Section):
+    """An experiment with gross errors in pairs; the defaults are the published one."""
+
+    photostrip_plan_screening: FirstSchema = key("Number of this schema: 1")
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    name: Words = key("Name of the plan", "screening")
+    principal_distance: Annotated[Number, After(bounded(PAIR_FOCAL))] = key(
+        "Principal distance", USUAL_SCREENING.layout.focal, unit="mm"
+    )
+    base: Size = key("Photo base", USUAL_SCREENING.layout.base, unit="mm")
+    width: Size = key("Distance of the side zones from the base", USUAL_SCREENING.layout.width, unit="mm")
+    zone_points: Annotated[list[Count], length(ZONES, ZONES)] = key(
+        "Points in each of the standard zones 1 to 6", list(USUAL_SCREENING.layout.counts)
+    )
+    zone_reach: NotNegative = key(
+        "How far points lie from the middle of their zone, in x and y, at most",
+        USUAL_SCREENING.layout.scatter,
+        unit="mm",
+    )
+    tilt: Annotated[Number, After(bounded(TILT))] = key("Largest tilt", USUAL_SCREENING.layout.tilt, unit="deg")
+    relief_percent: Annotated[Number, After(bounded(PAIR_RELIEF))] = key(
+        "Largest relief, up and down, of the flying height", 100 * USUAL_SCREENING.layout.relief, unit="%"
+    )
+    parallax_sigma_um: SigmaUm = key(
+        "Standard deviation of a y parallax", MICROMETRES * USUAL_SCREENING.layout.parallax_sigma, unit="um"
+    )
+    models: Annotated[Whole, After(bounded(PAIRS))] = key("Pairs, each with an error", USUAL_SCREENING.models)
+    second_errors: Annotated[Whole, After(bounded(Range(0, 1000, "")))] = key(
+        "Pairs of them that have a second one", USUAL_SCREENING.second
+    )
+    error_sizes_um: Annotated[list[Positive], length(1, 20)] = key(
+        "Sizes of the errors, each as often as any other",
+        [MICROMETRES * size for size in USUAL_SCREENING.sizes],
+        unit="um",
+    )
+    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], length(1)] = key(
+        "Methods, of `processing.relative.screening`", list(USUAL_SCREENING.methods)
+    )
+    grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL_SCREENING.grubbs_alpha)
+    parallax_limit: Positive = key("Limit of `parallax+grubbs`", USUAL_SCREENING.parallax_limit, unit="mm")
+    repetitions: Annotated[Whole, After(bounded(REPETITIONS))] = key(
+        "How often the experiment is made", USUAL_SCREENING.repetitions
+    )
+    seed: Whole = key("Number that makes the drawn pairs and errors the same again", USUAL_SCREENING.seed)
+
+    @rule
+    def _errors_have_pairs(self) -> None:
+        if self.second_errors > self.models:
+            message = f"{self.second_errors} second errors do not go into {self.models} pairs"
+            raise wrong(message, code="range", at="second_errors", expected=f"0 to {self.models}")
+
+
+class ScreeningPlan(NamedTuple):
+    name: str
+    spec: ScreeningSpec
+    files: Sequence[str]
+
+
+def load_screening_plan(path: Path | None, assignments: Sequence[str]) -> ScreeningPlan:
+    """Read the plan of an experiment, or raise its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_keys(ScreeningPlanFile, path, assignments)
+    layout = PairLayout(
+        focal=given.principal_distance,
+        base=given.base,
+        width=given.width,
+        counts=tuple(given.zone_points),
+        scatter=given.zone_reach,
+        tilt=given.tilt,
+        relief=given.relief_percent / 100,
+        parallax_sigma=given.parallax_sigma_um / MICROMETRES,
+    )
+    spec = ScreeningSpec(
+        layout=layout,
+        models=given.models,
+        second=given.second_errors,
+        sizes=tuple(size / MICROMETRES for size in given.error_sizes_um),
+        methods=tuple(dict.fromkeys(map(str, given.methods))),
+        grubbs_alpha=given.grubbs_alpha,
+        parallax_limit=given.parallax_limit,
+        repetitions=given.repetitions,
+        seed=given.seed,
+    )
+    return ScreeningPlan(name=str(given.name), spec=spec, files=reading.files)
