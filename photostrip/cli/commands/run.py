@@ -55,7 +55,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Adjust the strips of a project and report the accuracy.
 
     The report goes to stdout, in at most 120 lines; --verbose prints all of it, --section a part. With -o, DIR gets
-    result.json with everything, each of its tables as CSV (points.csv, photos.csv, given_points.csv, residuals.csv ...),
+    result.json with everything, its tables as CSV (points.csv, photos.csv, given_points.csv, residuals.csv ...),
     refined.csv and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also when it is
     LOOK or UNVERIFIED. With --compare-methods and -o, each method gets a folder of its own in DIR.
     """
