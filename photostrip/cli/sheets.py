@@ -47,7 +47,9 @@ def check_target(output: Path | None, depfile: Path | None = None, *, picture: b
     raise typer.BadParameter(f"nothing is written as '{output.suffix}': the name may end in {known}", param_hint="-o")
 
 
-def deliver(sheet: Sheet, form: str, output: Path | None = None, *, quiet: bool = False) -> None:
+def deliver(
+    sheet: Sheet, form: str, output: Path | None = None, *, quiet: bool = False, width: int | None = None
+) -> None:
     """Write a sheet where a file is named; print it."""
     if output is not None and output.suffix.lower() in FORMS:
         from photostrip.formats.text.writing import write_text
@@ -62,7 +64,7 @@ def deliver(sheet: Sheet, form: str, output: Path | None = None, *, quiet: bool 
     elif form == "csv":
         sys.stdout.write(visible(sheet.csv()))
     else:
-        print_sections(sheet.title, sheet.sections(), markdown=form == "md")
+        print_sections(sheet.title, sheet.sections(), width, markdown=form == "md")
 
 
 def say(notes: Iterable[Note], *, quiet: bool) -> None:

@@ -14,7 +14,6 @@ from importlib import resources
 
 from photostrip.notes import Document
 from photostrip.report.commands.batch import batch_page_sections
-from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.links import link
 from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.pictures.batch import batch_maps
@@ -30,10 +29,6 @@ def to_html(document: Document) -> str:
     """Return the report of a result as one HTML file: style, pictures and script are in it, no link to elsewhere."""
     named = list(named_sections(document, everything=True))
     return _page(title_of(document), document["version"], _sections(named, pictures_of(document)))
-
-
-def methods_html(document: Document) -> str:
-    return sections_html(f"Methods: {document['name']}", document["version"], methods_sections(document))
 
 
 def batch_html(outcomes: Sequence[Document], version: str) -> str:

@@ -47,7 +47,7 @@ def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> N
     assert code == 0
     assert [row["adjustment"] for row in document["methods"]] == list(METHODS)
     by_name = {row["adjustment"]: row for row in document["methods"]}
-    rms = {name: row["check"]["plan"]["rms"] for name, row in by_name.items()}
+    rms = {name: row["check_plan_rms"] for name, row in by_name.items()}
     assert rms["bundle"] < rms["polynomial"] < rms["similarity"]
     assert document["best"] == {"plan": "bundle", "height": "bundle"}
     single = json.loads(run(capsys, PROJECT, *BUNDLE, "--format", "json")[1])

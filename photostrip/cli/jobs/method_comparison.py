@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from photostrip.cli.failures import failures_as
+from photostrip.cli.sheets import deliver
 from photostrip.cli.stderr import Messages
-from photostrip.cli.stdout import Document, Format, print_json, print_sections
+from photostrip.cli.stdout import Document, Format
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import Project, loaded_from
 from photostrip.pipeline.inputs import METHODS
-from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
-from photostrip.result.methods import method_of, methods_document, refused_method
+from photostrip.sheets.methods import methods_sheet
 
 
 def compare_methods(
@@ -34,8 +34,7 @@ def compare_methods(
     ``methods.html``. An adjustment that refuses the project, or its key in the project file, is named with its reason;
     when none succeeds, the first failure is raised.
     """
-    found: dict[str, Document] = {}
-    failures: list[PhotostripError] = []
+    found: dict[str, Document | PhotostripError] = {}
     name = ""
     with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
         for adjustment in METHODS:
@@ -43,26 +42,20 @@ def compare_methods(
             try:
                 result = _loaded(project, assignments, adjustment).run()
             except (GeometryError, InputError) as error:
-                found[adjustment] = refused_method(error)
-                failures.append(error)
+                found[adjustment] = error
                 continue
             name = result.name
-            found[adjustment] = method_of(result.in_columns)
+            found[adjustment] = result.in_columns
             if output is not None:
                 result.write(output / adjustment, html=html)
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
-        if len(failures) == len(found):
-            raise failures[0]
-        document = methods_document(name, found)
+        refused = [each for each in found.values() if isinstance(each, PhotostripError)]
+        if len(refused) == len(found):
+            raise refused[0]
+        sheet = methods_sheet(name, found)
         if html and output is not None:
-            from photostrip.report.html import methods_html
-
-            write_text(output / "methods.html", methods_html(document))
-    if form == "json":
-        print_json(document)
-    else:
-        title = f"Methods: {document['name']}"
-        print_sections(title, methods_sections(document), width, markdown=form != "text")
+            write_text(output / "methods.html", sheet.rendered("html"))
+    deliver(sheet, "md" if form == "github" else form, width=width)
     return EXIT_DONE
 
 
