@@ -204,26 +204,6 @@ def test_footprints_are_the_corners_of_the_photos_on_the_ground(block: Ran, tmp_
         )  # scale of the map
 
 
-@pytest.mark.parametrize(
-    ("output", "crs"),
-    [
-        (["output.crs=geocentric"], "EPSG:4326"),
-        (["output.crs=EPSG:4326", "output.axes=[north,east,up]"], "EPSG:4326"),
-        (["output.crs=+proj=tmerc +lat_0=49 +lon_0=13 +datum=WGS84 +units=m +type=crs"], "Transverse Mercator"),
-    ],
-)
-def test_other_frames_lie_where_they_are(output: list[str], crs: str, tmp_path: Path) -> None:
-    options = [word for each in output for word in ("--set", each)]
-    found = ran(tmp_path, *options, ground=GROUNDS["map"])
-    assert main(["convert", str(found), str(tmp_path / "a.gpkg"), "-q"]) == 0
-    _, geometry, meta = layer(tmp_path / "a.gpkg", "points")
-    place = np.mean(on_map(geometry), axis=0)[:2]
-    known = CRS(meta["crs"])
-    assert crs in {meta["crs"], known.to_json_dict().get("conversion", {}).get("method", {}).get("name")}
-    lonlat = Transformer.from_crs(known, known.geodetic_crs, always_xy=True).transform(*place)
-    assert lonlat == pytest.approx((13.5, 49.2), abs=0.01)
-
-
 # -------------------------------------------------------------------------------------------------- orthority
 
 

@@ -86,7 +86,11 @@ def test_residuals_stand_where_the_points_were_measured(frame: str) -> None:
 
 
 def test_points_have_their_differences_as_hints() -> None:
-    document = saved()
+    """Also the one of which only the height was given."""
+    document = copy.deepcopy(saved())
+    of_height = document["control"][0] | {"dx": None, "dy": None, "plan": None}
+    document["control"][0] = of_height
+    assert of_height["measured"]
     of_plan, along = hints(drawn(document, "plan")), hints(drawn(document, "deformation"))
     for row in nonempty([row for row in document["control"] if row["measured"] and row["height"] is not None]):
         name = f"{row['role']} point {row['id']}"

@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures.chart import Floats, Layer, Line, Marks, Panel, Segments, chart, span
-from photostrip.report.pictures.places import Plan, numbers
+from photostrip.report.pictures.places import Course, Plan, numbers
 from photostrip.report.pictures.plan import ROLES
 from photostrip.report.pictures.svg import Picture
 
@@ -70,8 +70,8 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
     at, shift = course.along(plan.points[after]), course.turned(plan.shift[after])
     earlier = [row for row in before if row["id"] in plan.row]
     earlier_at = course.along(plan.points[plan.rows(row["id"] for row in earlier)])
-    towards = np.array([[plan.north[1], plan.north[0], 0.0], [-plan.north[0], plan.north[1], 0.0], [0.0, 0.0, 1.0]])
-    missed = course.turned(numbers(earlier, "east", "north", "up") @ towards.T)
+    to_plan = Course(np.zeros(2), plan.north[::-1])  # of east, north and up
+    missed = course.turned(to_plan.turned(numbers(earlier, "east", "north", "up")))
     ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
     reach = span(np.concatenate([ends, at, earlier_at]), zero=False, room=0.02)
     block = next((row for row in plan.document.get("polynomials", []) if row["strip"] == strip), None)

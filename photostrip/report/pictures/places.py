@@ -70,9 +70,9 @@ class Course(NamedTuple):
 
     def turned(self, vectors: Floats) -> Floats:
         """Return vectors of the plan along the strip, to its left and up."""
-        x, y = self.direction
-        turn = np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
-        return np.asarray(vectors @ turn)
+        a, b = self.direction
+        x, y, up = np.moveaxis(np.asarray(vectors), -1, 0)  # what is not known of the plan leaves the height alone
+        return np.stack([x * a + y * b, y * a - x * b, up], axis=-1)
 
     def along(self, places: Floats) -> Floats:
         """Return distances from the first photo along the strip, km."""
