@@ -17,8 +17,8 @@ from photostrip.batch.outcomes import EXIT_CODES, failure, not_run
 from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
-from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, counts, outcome_line
+from photostrip.formats.output.batch import parsed_record, summary_csv, summary_json
+from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, outcome_line
 from photostrip.report.page.progress import batch_progress
 from photostrip.report.page.text import to_text
 from tests.batch.projects import command, environment, write_projects
@@ -54,11 +54,6 @@ FAULTY = failure("faulty", InputError([Fault("no <such> photo & \x01", "photo", 
 def test_every_status_has_an_exit_code_and_a_place_in_the_order() -> None:
     assert set(ORDER) == set(EXIT_CODES)
     assert [EXIT_CODES[status] for status in ORDER] == [70, 70, 70, 3, 2, 2, 1, 0, 0, 0, 0]
-
-
-def test_counts_in_words() -> None:
-    assert counts(lines(good(), FAULTY, not_run(), good())) == "4 projects: 1 faulty, 1 not run, 2 good"
-    assert counts(lines(good())) == "1 project: 1 good"
 
 
 def test_of_too_many_projects_the_worst_are_shown() -> None:
@@ -99,14 +94,6 @@ def test_the_summary_is_true_xml_and_json() -> None:
 )
 def test_what_is_no_record_is_not_taken_for_one(content: bytes) -> None:
     assert parsed_record(content) is None
-
-
-def test_a_record_comes_back() -> None:
-    record = {
-        "photostrip_batch_record": 1, "program": {"a": "1"}, "project": "µ.yaml", "set": [], "inputs": {"x": None},
-        "outputs": {}, "outcome": good(),
-    }  # fmt: skip
-    assert parsed_record(record_text(record).encode()) == record
 
 
 # ------------------------------------------------------------------------------------------------- meanwhile

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import errno
 import json
-import resource
 import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -119,21 +118,6 @@ def test_a_result_replaces_no_file_of_its_project(here: Path, capsys: pytest.Cap
 
 
 @pytest.mark.slow
-def test_files_that_the_system_cuts_off(here: Path) -> None:
-    """A limit of the system on the size of files, as a quota is: a real write fails in the middle of result.json."""
-
-    def small_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-
-    done = batch(here, "strips", "-o", "out", "-j", "1", before=small_files)
-    assert done.returncode == 2
-    assert "the result cannot be written: file too large" in done.stdout
-    assert "5 projects: 3 unwritten, 2 not run" in done.stdout
-    left = {path.name for path in (here / "out").rglob("*") if path.is_file()}
-    assert left <= {".batch.lock", "summary.txt", "summary.csv", "summary.json", "junit.xml"}
-
-
-@pytest.mark.slow
 def test_an_output_that_must_not_be_written_to_is_refused_at_once(here: Path) -> None:
     (here / "out").mkdir(mode=0o555)
     done = batch(here, "strips", "-o", "out")
@@ -172,38 +156,6 @@ def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest
         assert tree(here / "out") == before  # nothing touched, the summary of the first one neither
     assert "error: out: another batch is writing into this folder" in capsys.readouterr().err
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_quick_start")
-def test_the_lock_dies_with_its_process(here: Path) -> None:
-    code = "import os, pathlib\nfrom photostrip.batch.result_folder import opened\n"
-    code += "with opened(pathlib.Path('out')): os.kill(os.getpid(), 9)"
-    with subprocess.Popen([command()[0], "-c", code], cwd=here, env=environment()) as process:
-        assert process.wait() == -9
-    with opened(here / "out"):
-        pass
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_quick_start")
-def test_of_two_batches_started_together_one_works(here: Path) -> None:
-    started = [
-        subprocess.Popen(
-            command("strips", "-o", "out", "-j", "1"),
-            cwd=here,
-            env=environment(),
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for _ in range(2)
-    ]
-    told = [process.communicate()[1] for process in started]
-    codes = [process.returncode for process in started]
-    assert sorted(codes) == [0, 2]
-    assert "another batch is writing into this folder" in told[codes.index(2)]
-    assert json.loads((here / "out" / "summary.json").read_text(encoding="utf-8"))["counts"] == {"good": 5}
 
 
 @pytest.mark.slow

@@ -66,13 +66,6 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str
     return base / "plain-result", base / "odd-result", photos, points
 
 
-@pytest.mark.slow
-def test_all_kinds_of_ids_are_there(both: tuple[Path, Path, dict[str, str], dict[str, str]]) -> None:
-    assert set(ODD) <= set(both[3].values())
-    for kind in ("0123", "NO", "1:20", "1e3", "~", "Точка-7", "🛩️", "x" * 200, "-1", "+7", "-", "--"):
-        assert kind in both[3].values()
-
-
 def test_the_result_has_the_same_numbers_under_the_new_ids(
     both: tuple[Path, Path, dict[str, str], dict[str, str]],
 ) -> None:

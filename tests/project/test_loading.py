@@ -384,10 +384,6 @@ def test_curvature_of_eq_153_is_for_local_coordinates(tmp_path: Path) -> None:
 # -------------------------------------------------------------------------------------------------- what is noted
 
 
-def test_a_clean_project_has_little_to_note(tmp_path: Path) -> None:
-    assert sample(tmp_path).load().hints == ()
-
-
 def test_photos_in_no_strip(tmp_path: Path) -> None:
     project = sample(tmp_path)
     project.write("observations.csv", OBSERVATIONS + "3001,P9,1,2\n3001,P1,1,2\n1001.tif,P1,1,2\n")

@@ -133,14 +133,6 @@ def test_a_strip_from_a_stereocomparator_is_that_of_its_photos(tmp_path: Path) -
 # ------------------------------------------------------------------------------------------ measured again
 
 
-def test_points_measured_again_are_refused_unless_asked_for(sample: Sample) -> None:
-    sample.write("observations.csv", AGAIN)
-    assert told(sample)[0].endswith(
-        "point P1 is already measured on photo 1001, in line 2; keep one of the two, give one another id, or set "
-        "`repeated: average`"
-    )
-
-
 def test_points_measured_again_are_averaged_and_their_spread_told(sample: Sample) -> None:
     sample.write("observations.csv", AGAIN)
     sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
@@ -198,12 +190,6 @@ def test_a_declared_column_goes_before_its_usual_name(sample: Sample) -> None:
     sample.write("observations.csv", text + "\n")
     sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {x: x refined}\n")
     assert measured(sample.load()) == usual
-
-
-def test_control_and_marks_have_names_of_their_own(sample: Sample) -> None:
-    sample.write("control.csv", FILES["control.csv"].replace("point,x,y,z", "Nummer,Rechts,Hoch,H"))
-    sample.change("project.yaml", "    axes:", "    columns: {point: Nummer, x: Rechts, y: Hoch, z: H}\n    axes:")
-    assert sample.load().inputs.control.ids == ("G1", "P2")
 
 
 @pytest.mark.parametrize(

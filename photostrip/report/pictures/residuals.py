@@ -153,101 +153,51 @@ def _cells(at: Floats, v: Floats, size: float) -> Floats:
     return np.column_stack([means, count])[count >= LEAST_IN_CELL]
 
 
-class Sample(NamedTuple):
-    """Residuals and what they were tested against."""
-
-    name: str
-    values: Floats
-    unit: str
-    sigma: float
-    limits: list[float]  # none: not tested
-
-    @property
-    def reach(self) -> float:
-        """Return what the axis holds, to both sides."""
-        return max(LEAST_REACH * self.sigma, 1.1 * max(self.limits, default=0.0)) or 1.0
-
-
 def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:
-    """Draw the residuals of a bundle standardised; of strips in µm, beside the y parallaxes that were tested."""
-    document, used = plan.document, known & rays.used
-    tested = rays.test[used]
-    tested = tested[np.isfinite(tested).all(axis=1)].ravel()
-    sizes = rays.v[used].ravel()
-    caption = (
-        "How the image residuals are distributed, each over its own standard deviation, with the limits of the search "
-        "for gross errors."
-    )
-    if len(tested):
-        limits = [document["bundle"]["screening"]["limit"]]
-        samples = [Sample("image residuals", tested, "standard deviations", 1.0, limits)]
-    else:
-        samples = [Sample("image residuals", sizes, "µm", rms(sizes), []), *_parallaxes(document)]
-        caption = (
-            "How the image residuals are distributed. They are smaller than the errors of the measurements, of which "
-            "the orientations took up a part; gross errors were sought in the y parallaxes of the pairs, not here."
-        )
-    for sample in samples[1:]:
-        low, high = min(sample.limits), max(sample.limits)
-        caption += (
-            " On the right the y parallaxes of the points used, and the limit beyond which a point of ordinary "
-            f"redundancy is taken out: {median(sample.limits):.1f} µm in the median of the pairs, {low:.1f} to "
-            f"{high:.1f} µm."
-        )
-    beyond = sum(int((np.abs(sample.values) > sample.reach).sum()) for sample in samples)
-    if beyond:
-        caption += (
-            f" {counted(beyond, 'residual')} beyond the axis {'is' if beyond == 1 else 'are'} counted at its ends."
-        )
-    panels = [_classes(sample, sample.name if len(samples) > 1 else "") for sample in samples]
-    words = "Distribution of the residuals", caption, " ".join(map(_tails, samples))
-    return chart("histogram", words, panels, columns=len(panels), height=240.0)
+    """Draw how what was tested for gross errors is distributed, with the limits.
 
-
-def _parallaxes(document: Document) -> list[Sample]:
-    """Return the y parallaxes of the points used, with the limits of their pairs; nothing without either."""
+    That are the image residuals of a bundle, each over its standard deviation, and the y parallaxes of strips; where
+    nothing was tested, the image residuals.
+    """
+    document, tests = plan.document, rays.test[known & rays.used]
+    tests = tests[np.isfinite(tests).all(axis=1)]
     limits = [row["limit_um"] for row in document["models"] if row.get("limit_um") is not None]
-    values = [
-        size
-        for row in document["parallaxes"]
-        for size, used in zip(row["q_um"], row["used"], strict=True)
-        if used and size is not None
-    ]
-    if not limits or not values:
-        return []
-    return [Sample("y parallaxes of the pairs", np.array(values), "µm", rms(np.array(values)), limits)]
-
-
-def _classes(sample: Sample, title: str) -> Panel:
-    """Draw the counts of classes with the normal curve and the limits."""
-    reach, unit = sample.reach, " µm" if sample.unit == "µm" else ""
-    edges = np.linspace(-reach, reach, BARS + 1)
-    counts = np.histogram(np.clip(sample.values, -reach, reach), edges)[0]
-    x = np.linspace(-reach, reach, 121)
-    sigma = sample.sigma or 1.0
-    curve = len(sample.values) * (edges[1] - edges[0]) * np.exp(-((x / sigma) ** 2) / 2) / (sigma * np.sqrt(2 * np.pi))
-    high = 1.08 * float(max(counts.max(), curve.max()))
-    layers: list[Layer] = []
-    if sample.limits and max(sample.limits) > min(sample.limits):
-        ends = min(sample.limits), max(sample.limits)
-        boxes = [box((-ends[1], -ends[0]), (0.0, high)), box(ends, (0.0, high))]
-        layers.append(Areas(boxes, "area failed", words="all limits"))
+    if len(tests):
+        limits, unit, sigma = [document["bundle"]["screening"]["limit"]], "", 1.0
+        values, what = tests.ravel(), "image residuals, each over its own standard deviation"
+    else:
+        pairs: list[Document] = document["parallaxes"] if limits else []
+        used = [zip(pair["q_um"], pair["used"], strict=True) for pair in pairs]
+        parallaxes = [size for pair in used for size, taken in pair if taken and size is not None]
+        values = np.array(parallaxes) if parallaxes else rays.v[known & rays.used].ravel()
+        limits, unit, sigma = limits if parallaxes else [], " µm", rms(values) or 1.0
+        what = "y parallaxes of the pairs" if parallaxes else "image residuals"
+    reach = max(LEAST_REACH * sigma, 1.1 * max(limits, default=0.0))
+    edges, x = np.linspace(-reach, reach, BARS + 1), np.linspace(-reach, reach, 121)
+    counts = np.histogram(np.clip(values, -reach, reach), edges)[0].tolist()
+    curve = len(values) * (edges[1] - edges[0]) / sigma * np.exp(-((x / sigma) ** 2) / 2) / np.sqrt(2 * np.pi)
+    high = 1.08 * float(max(*counts, curve.max()))
     columns = [n for n in range(BARS) if counts[n]]
-    boxes = [box((float(edges[n]), float(edges[n + 1])), (0.0, float(counts[n]))) for n in columns]
-    layers.append(Areas(boxes, "column", [counted(int(counts[n]), "residual") for n in columns], "residuals"))
-    layers.append(Line(np.column_stack([x, curve]), "c2", f"normal curve, σ = {sigma:.3g}{unit}"))
-    if sample.limits:
-        limit = median(sample.limits)
+    boxes = [box((float(edges[n]), float(edges[n + 1])), (0.0, counts[n])) for n in columns]
+    layers: list[Layer] = [
+        Areas(boxes, "column", [counted(counts[n], "residual") for n in columns], what.partition(",")[0]),
+        Line(np.column_stack([x, curve]), "c2", f"normal curve, σ = {sigma:.3g}{unit}"),
+    ]
+    caption = f"How the {what} are distributed"
+    if limits:
+        limit, ends = median(limits), (min(limits), max(limits))
         words = f"median limit ±{limit:.1f} µm" if unit else f"rejected beyond ±{limit:.2f}"
         foot, head = (np.array([(-limit, y), (limit, y)]) for y in (0.0, high))
+        sides = [box((-ends[1], -ends[0]), (0.0, high)), box(ends, (0.0, high))]
+        layers = [Areas(sides, "area failed", words="all limits")] * (ends[0] < ends[1]) + layers
         layers.append(Segments(foot, head, "failed dashed", words=words))
-    return Panel(layers, title, (f"residual, {sample.unit}", "number"), (-reach, reach), (0.0, high))
-
-
-def _tails(sample: Sample) -> str:
-    three = int((np.abs(sample.values) > 3 * sample.sigma).sum())
-    chance = 2 * NormalDist().cdf(-3.0) * len(sample.values)
-    return (
-        f"{len(sample.values)} {sample.name.split(' of ')[0]}, {three} beyond three standard deviations; "
-        f"{chance:.1f} would be by chance."
-    )
+        caption += ", with the limits of the search for gross errors"
+        caption += f": {ends[0]:.1f} to {ends[1]:.1f} µm for points of ordinary redundancy" if unit else ""
+    beyond = int((np.abs(values) > reach).sum())
+    if beyond:
+        caption += f". At the ends of the axis {counted(beyond, 'residual')} beyond it"
+    three, chance = int((np.abs(values) > 3 * sigma).sum()), 2 * NormalDist().cdf(-3.0) * len(values)
+    words = f"{len(values)} in all, {three} beyond three standard deviations; {chance:.1f} would be by chance."
+    labels = f"residual{f',{unit}' if unit else ' over its standard deviation'}", "number"
+    panel = Panel(layers, "", labels, (-reach, reach), (0.0, high))
+    return chart("histogram", ("Distribution of the residuals", f"{caption}.", words), [panel], height=240.0)

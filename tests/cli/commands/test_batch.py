@@ -118,13 +118,7 @@ def test_a_tolerance_is_a_failure_and_a_fault_an_error(here: Path, capsys: pytes
     kinds = {case.get("name"): [inner.tag for inner in case] for case in suite}
     assert kinds["strips/s1/project.yaml"] == ["failure"]
     assert kinds["strips/s3/project.yaml"] == ["error"]
-
-
-@pytest.mark.parametrize(("change", "code"), [("", 0), ("tolerances.sigma0_um=0.001", 1), ("observations.sigma=no", 2)])
-def test_the_exit_code_is_that_of_the_worst_project(here: Path, change: str, code: int) -> None:
-    options = ["--set", change] if change else []
-    assert main(["batch", "strips/s1", "--quiet", *options]) == code
-    assert not (here / "s1").exists()
+    assert main(["batch", "strips/s1", "--set", "tolerances.sigma0_um=0.001", "-q"]) == 1  # that of the worst
 
 
 @pytest.mark.slow

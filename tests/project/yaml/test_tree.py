@@ -164,13 +164,3 @@ def test_an_alias_is_what_its_anchor_names() -> None:
     shared = ["x", {"k": "v"}]
     assert root.plain == {"a": shared, "b": shared, "c": {"d": shared}}
     assert root.place_of(("b",)).line == 1  # where it would be put right
-
-
-def test_a_project_that_a_script_dumped_is_read() -> None:
-    photos = ["101", "102"]
-    text = yaml.safe_dump({"strips": [{"photos": photos}], "order": photos})
-    assert "&id001" in text
-    root, findings = read(text)
-    assert not findings.faults
-    assert root is not None
-    assert root.plain == {"strips": [{"photos": photos}], "order": photos}

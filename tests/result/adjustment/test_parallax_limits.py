@@ -83,4 +83,4 @@ def test_the_histogram_has_the_limits() -> None:
     bundle = solved(case().inputs, Settings(adjustment="bundle")).document
     of_bundle = next(each for each in pictures_of(bundle) if each.name == "histogram")
     assert f"±{bundle['bundle']['screening']['limit']:.2f}" in of_bundle.svg
-    assert "y parallaxes of the pairs" not in of_bundle.svg
+    assert "y parallaxes" not in of_bundle.svg
