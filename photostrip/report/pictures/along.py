@@ -74,15 +74,17 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
     missed = course.turned(to_plan.turned(numbers(earlier, "east", "north", "up")))
     ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
     reach = span(np.concatenate([ends, at, earlier_at]), zero=False, room=0.02)
-    block = next((block for block in plan.document.get("polynomials", []) if block["strip"] == strip), None)
+    block = next((row for row in plan.document.get("polynomials", []) if row["strip"] == strip), None)
+    terms = list(plan.document["polynomial_terms"].where(strip=strip)) if block else []
     taken = plan.document["adjustment"] == "polynomial"
     panels = []
     for number, (axis, key) in enumerate(AXES):
         layers: list[Layer] = []
-        if block and block["degree"] and earlier and block["terms"][key]:
+        of_axis = [row for row in terms if row["axis"] == key]
+        if block and of_axis and earlier:
             places = np.linspace(min(*ends, *earlier_at), max(*ends, *earlier_at), CURVE_STEPS)
-            start = float(block["reach"][0]) - 1000.0 * float(earlier_at.min())  # X of the first photo
-            curve = np.column_stack([places, -polynomial(block, key, 1000.0 * places + start)])
+            start = float(block["reach_from"]) - 1000.0 * float(earlier_at.min())  # X of the first photo
+            curve = np.column_stack([places, -polynomial(of_axis, 1000.0 * places + start)])
             layers.append(Line(curve, "c2", "polynomial" if taken else "polynomial, not taken"))
         hints = [f"{row['id']} before: {size:+.3f} m" for row, size in zip(earlier, missed[:, number], strict=True)]
         at_before = np.column_stack([earlier_at, missed[:, number]])
@@ -100,13 +102,13 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
     return panels
 
 
-def polynomial(block: Document, axis: str, x: Floats) -> Floats:
+def polynomial(terms: Sequence[Document], x: Floats) -> Floats:
     """Return a polynomial on the axis of the strip, where terms with Y vanish."""
     total = np.zeros_like(x)
-    for term, coefficient in zip(block["terms"][axis], block["coefficients"][axis], strict=True):
-        power = re.fullmatch(r"(?:1|X(?:\^(\d))?)", term)
+    for row in terms:
+        power = re.fullmatch(r"(?:1|X(?:\^(\d))?)", row["term"])
         if power:
-            total += coefficient * x ** (0 if term == "1" else int(power[1] or 1))
+            total += row["coefficient"] * x ** (0 if row["term"] == "1" else int(power[1] or 1))
     return total
 
 
