@@ -5,7 +5,7 @@ without those measurements and the wrong control (what could be reached at best)
 to 50 mm (all sizes on a logarithmic scale equally often), along one axis; in a third of the projects one control
 coordinate is wrong too. Kinds: strips of 20 photos, blocks of 4 strips of 12 photos by bundle (with GNSS and control at
 the corners of the strips, or with control along the perimeter), and strips of 19 independent models, with errors of
-their points or of their perspective centres, too.
+their points or of their perspective centres, too; ``wrong-control`` are strips with two fifths of the control wrong.
 
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
 with a wrong measurement of their own are therefore left out of the errors.
@@ -40,6 +40,7 @@ from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
 from photostrip.strip.control_screening import EITHER, WRONG_IMAGE  # noqa: E402
+from tests.much_wrong_control import two_fifths_wrong  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ STRIP = Spec(
     control=Control(layout="bands", bands=7, per_band=3),
 )
 BLOCK = replace(STRIP, flight=replace(STRIP.flight, photos=12, strips=4))
+WRONG_CONTROL = "wrong-control"
 KINDS = {
     "strips": STRIP,
     "gnss": replace(BLOCK, control=Control(layout="corners"), gnss=Gnss()),
@@ -351,17 +353,27 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range) -> None:
     print(flush=True)
 
 
+def print_much_wrong(pool: Pool, seeds: range) -> None:
+    """Print how many strips with two fifths of the control wrong lose just that."""
+    wrong, named, others = np.array(pool.map(two_fifths_wrong, seeds, 1)).T
+    print(f"two fifths of the control wrong: {((wrong == named) & (others == 0)).sum()} of {len(seeds)} strips lose")
+    print(f"just that; {named.sum()} of {wrong.sum()} wrong coordinates named, {others.sum()} others", flush=True)
+
+
 def main() -> None:
     """Print the tables that are asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("projects", type=int, nargs="?", default=60, help="projects of each kind (default 60)")
-    parser.add_argument("--kind", choices=[*KINDS, "all"], default="all")
+    parser.add_argument("--kind", choices=[*KINDS, WRONG_CONTROL, "all"], default="all")
     parser.add_argument("--first-seed", type=int, default=1, help="number of the first project (default 1)")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.projects)
     with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
-        print_kinds(pool, [kind for kind in KINDS if options.kind in {kind, "all"}], seeds)
+        if kinds := [kind for kind in KINDS if options.kind in {kind, "all"}]:
+            print_kinds(pool, kinds, seeds)
+        if options.kind in {WRONG_CONTROL, "all"}:
+            print_much_wrong(pool, seeds)
 
 
 if __name__ == "__main__":

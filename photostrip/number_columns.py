@@ -7,8 +7,6 @@ together. Matrices are put on each other for lines; what fills them is taken out
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import groupby, pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +14,6 @@ from numpy.typing import NDArray
 from photostrip.arrays import Flags, Floats
 
 Cells = NDArray[np.uint8]  # (w, n)
-Lists = list[bytes]  # n lists of cells, one text each
-Column = Cells | Lists
 Texts = NDArray[np.bytes_]  # (n,)
 Count = NDArray[np.uint64]
 
@@ -67,42 +63,15 @@ def texts_of(texts: Sequence[str] | Texts) -> Texts:
         return np.array([text.encode() for text in map(str, texts)])
 
 
-def as_flags(values: Flags, texts: tuple[str, str]) -> Cells:
-    """Write one text for no and another for yes."""
-    return as_texts(texts_of(texts)[values.view(np.uint8)])
-
-
 def repeated(text: str, count: int) -> Cells:
     """Write the same for every cell."""
     return np.broadcast_to(np.frombuffer(text.encode(), np.uint8)[:, None], (len(text.encode()), count))
 
 
-def joined(columns: Sequence[Column], between: str) -> str:
-    """Join the cells of columns line by line, with something between the lines.
-
-    Beside lists no cell may hold a line end.
-    """
-    matrices = [column for column in columns if not isinstance(column, list)]
-    if len(matrices) == len(columns):
-        return _joined(matrices, between)[: -len(between)].decode()
-    parts: list[Lists] = []
-    for kind, group in groupby(columns, type):
-        some: list[Any] = list(group)
-        parts += some if kind is list else [_joined(some, "\n").split(b"\n")[:-1]]
-    return between.encode().join(map(b"".join, zip(*parts, strict=True))).decode()
-
-
-def _joined(columns: Sequence[Cells], end: str) -> bytes:
-    return np.concatenate([*columns, repeated(end, columns[0].shape[1])]).T.tobytes().translate(None, b"\0")
-
-
-def listed(cells: Cells, ends: Sequence[int]) -> Lists:
-    """Write the cells between two ends each as a list in brackets; none may hold a line end."""
-    between = np.repeat(np.frombuffer(b", ", np.uint8)[:, None], cells.shape[1], axis=1)
-    places = np.asarray(ends)
-    between[:, places[1:][places[1:] > places[:-1]] - 1] = [[ord("\n")], [0]]
-    lists = iter(np.concatenate([cells, between]).T.tobytes().translate(None, b"\0").split(b"\n"))
-    return [b"[%b]" % next(lists) if stop > start else b"[]" for start, stop in pairwise(places.tolist())]
+def joined(columns: Sequence[Cells], between: str) -> str:
+    """Join the cells of columns line by line, with something between the lines."""
+    cells = np.concatenate([*columns, repeated(between, columns[0].shape[1])])
+    return cells.T.tobytes().translate(None, b"\0")[: -len(between)].decode()
 
 
 def _with_others(cells: Cells, values: Floats, known: Flags, missing: str, write: Callable[[float], str]) -> Cells:

@@ -9,6 +9,7 @@ import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from photostrip.cli.main import main
+from photostrip.result.table import plain_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,7 +37,7 @@ class Edited(NamedTuple):
 
 def edited(document: Any, random: Random) -> Edited:  # noqa: ANN401 (any JSON)
     """Do one to three things to a document."""
-    document = json.loads(json.dumps(document, default=list))
+    document = json.loads(json.dumps(plain_of(document)))
     done = [_edit(document, random) for _ in range(random.randint(1, 3))]
     text = json.dumps(document).replace(f'"{TOO_LONG}"', "9" * 5000)
     if random.random() < 0.05:

@@ -83,7 +83,7 @@ def _class(kind: type) -> list[str]:
     rows = [*_attributes(kind), *_properties(kind)]
     if rows:
         lines += ["| attribute | |", "|---|---|", *(f"| `{name}` | {_escaped(text)} |" for name, text in rows), ""]
-    for name, member in vars(kind).items():
+    for name, member in _members(kind).items():
         if inspect.isfunction(member) and (not name.startswith("_") or name == "__getitem__"):
             title = f"`{kind.__name__}[key]`" if name == "__getitem__" else f"`{kind.__name__}.{name}`"
             lines += [f"#### {title}", "", "```python", _signature(member), "```", ""]
@@ -91,8 +91,13 @@ def _class(kind: type) -> list[str]:
     return lines
 
 
+def _members(kind: type) -> dict[str, Any]:
+    """Give the members of a class, those of its bases first."""
+    return {name: member for part in reversed(kind.__mro__[:-1]) for name, member in vars(part).items()}
+
+
 def _properties(kind: type) -> Iterator[tuple[str, str]]:
-    for name, member in vars(kind).items():
+    for name, member in _members(kind).items():
         if not name.startswith("_") and (isinstance(member, property) or hasattr(member, "attrname")):
             yield name, " ".join((inspect.getdoc(member) or "").split())
 

@@ -7,12 +7,11 @@ review the difference before committing it.
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
-from photostrip.formats.output.result_json import to_json
+from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.text import to_markdown, to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
@@ -35,8 +34,7 @@ TOLERANCES = {"check_rms_xy": 0.01, "check_rms_z": 1.0, "sigma0_um": 8.0}
 @cache
 def saved() -> Document:
     """Give the saved result."""
-    document: Document = json.loads(RESULT.read_text(encoding="utf-8"))
-    return document
+    return read_result(str(RESULT))
 
 
 def fresh() -> Document:

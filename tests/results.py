@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from photostrip.formats.output.simulation import project_files
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.library import result as library
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
+from photostrip.result.description import Block, Columns, described
 from photostrip.result.document import document_of
+from photostrip.result.quantities import MATRIX
+from photostrip.result.table import Table, as_array, in_frame
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
 from tests.simulated import inputs_of
@@ -20,7 +26,6 @@ from tests.simulated import inputs_of
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from photostrip.pipeline.frames import TiedFrames
@@ -39,6 +44,11 @@ FRAMES = {
     "geocentric": Ground("geocentric", ("x", "y", "z")),
     "south": Ground("EPSG:32719", center_deg=(-68.0, -33.0)),
 }
+
+
+def rotation(photo: Document) -> NDArray[np.float64]:
+    """Give the matrix of a photo or a model."""
+    return np.array([photo[name] for name in MATRIX]).reshape(3, 3)
 
 
 def result_files(document: Document, resolved: str = "") -> dict[str, str]:
@@ -120,3 +130,31 @@ def write_project(folder: Path, spec: Spec, more: str = "") -> Path:
     for name, text in project_files(simulate(spec)).items():
         (folder / name).write_text(text + (more if name == "project.yaml" else ""), encoding="utf-8")
     return folder / "project.yaml"
+
+
+def by_rows(value: Any) -> Any:  # noqa: ANN401 (any part of a document)
+    """Give a copy of a document that may be changed: its tables as lists of rows."""
+    if isinstance(value, dict):
+        return {key: by_rows(each) for key, each in value.items()}
+    return copy.deepcopy(list(value) if isinstance(value, Table) else value)
+
+
+def in_tables(value: Any, block: Block | None = None) -> Any:  # noqa: ANN401
+    """Give a document with tables again; a row that lacks a key has nothing there."""
+    entries = described() if block is None else block
+    found = dict(value)
+    for key, entry in entries.items():
+        if isinstance(entry, Columns) and isinstance(value.get(key), list):
+            keys = list(dict.fromkeys(name for row in value[key] for name in row)) or [
+                name for name, each in entry.items() if not each.optional
+            ]
+            columns = {name: as_array(entry[name], [row.get(name) for row in value[key]]) for name in keys}
+            found[key] = Table(key, columns, entry)
+        elif isinstance(entry, Block) and isinstance(value.get(key), dict):
+            found[key] = in_tables(value[key], entry)
+    return in_frame(found) if block is None and "frame" in found else found
+
+
+def columns_of(rows: list[Document]) -> dict[str, list[Any]]:
+    """Give rows as JSON has their table."""
+    return {key: [row[key] for row in rows] for key in rows[0]}

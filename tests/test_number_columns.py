@@ -49,21 +49,3 @@ def test_what_is_no_number_is_missing_and_texts_stay() -> None:
     assert written(number_columns.as_fixed(values, 1, "")) == ["1.5", "", "-2.0", "0.0"]
     assert written(number_columns.as_whole(np.array([0, -17, 4000]))) == ["0", "-17", "4000"]
     assert written(number_columns.as_texts(["a", "", "Höhe 2"])) == ["a", "", "Höhe 2"]
-    cells = number_columns.as_whole(np.array([1, 22, 333]))
-    assert number_columns.listed(cells, [0, 2, 2, 3]) == [b"[1, 22]", b"[]", b"[333]"]
-    names = number_columns.as_texts(["é", "b", "Höhe 2", ""])
-    assert number_columns.listed(names, [0, 0, 2, 4]) == [b"[]", "[é, b]".encode(), "[Höhe 2, ]".encode()]
-    assert written(number_columns.as_flags(np.array([True, False]), ("no", "yes"))) == ["yes", "no"]
-
-
-def test_lists_stand_between_cells() -> None:
-    cells = number_columns.as_whole(np.array([1, 22, 333]))
-    lists = number_columns.listed(cells, [0, 2, 2, 3])
-    columns: list[number_columns.Column] = [
-        cells,
-        number_columns.repeated(": ", 3),
-        lists,
-        lists,
-        number_columns.repeated(";", 3),
-    ]
-    assert number_columns.joined(columns, ",\n") == "1: [1, 22][1, 22];,\n22: [][];,\n333: [333][333];"

@@ -6,7 +6,7 @@ import math
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +18,20 @@ from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
+from photostrip.result.description import LEFT_OUT
+from photostrip.result.quantities import MATRIX
 from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
+from photostrip.result.table import Table
 
 SCHEMA = 1
-# What is ours, what the other numbers are made of, and what is made of them.
-LEFT_OUT = ("version", "statement", "certificate", "residuals", "parallaxes", "link_residuals")
-RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials"}  # whose records a set counts
+RECORDS_IN_SETS = {
+    "photos",
+    "points",
+    "models",
+    "strips",
+    "polynomials",
+    "polynomial_terms",
+}  # whose records a set counts
 SAME_FRAME = {
     "crs": "the CRS",
     "kind": "the kind of frame",
@@ -96,14 +104,11 @@ def _require_comparable(document: Document, baseline: Document, files: tuple[str
 
 def _frame(document: Document) -> Document:
     """Return the frame of a document; an empty one when there is none."""
-    found = document.get("frame")
-    return found if isinstance(found, dict) else {}
+    return dict(document.get("frame") or {})
 
 
 def _common_points(document: Document, baseline: Document) -> bool:
-    now, before = (
-        {row.get("id") for row in each.get("points") or [] if isinstance(row, dict)} for each in (document, baseline)
-    )
+    now, before = (set(each["points"]["id"]) if "points" in each else set() for each in (document, baseline))
     return bool(now & before)
 
 
@@ -236,27 +241,36 @@ Difference = tuple[str, str, str, float]  # kind, block, id, size; infinite wher
 
 def _places(block: str, document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare places, in plan and in height; a photo may have no place in both."""
-    ids, (now, before) = _shared(document[block], baseline[block], ("x", "y", "z"))
-    known = np.flatnonzero(~(np.isnan(now) & np.isnan(before)).all(axis=1))
-    for kind, sizes in zip(
-        ("plan", "height"), plan_and_height(baseline["frame"], now[known], before[known]), strict=True
-    ):
-        yield from _sizes(kind, block, [ids[row] for row in known], sizes)
+    now, before = _shared(document[block], baseline[block])
+    one, other = _columns(now, "x", "y", "z"), _columns(before, "x", "y", "z")
+    known = np.flatnonzero(~(np.isnan(one) & np.isnan(other)).all(axis=1))
+    sizes = plan_and_height(baseline["frame"], one[known], other[known])
+    for kind, size in zip(("plan", "height"), sizes, strict=True):
+        yield from _sizes(kind, block, now["id"][known].tolist(), size)
 
 
 def _control(document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare the differences at given points, in plan and in height, as far as each counts."""
-    ids, (now, before) = _shared(document["control"], baseline["control"], ("dx", "dy", "dz"))
-    places = {row["id"]: [row[axis] for axis in "xyz"] for row in baseline["points"]}
-    known = [n for n, name in enumerate(ids) if name in places]
-    at = np.array([places[ids[n]] for n in known], float).reshape(-1, 3)
-    one, other, size = (
-        difference_in_plan_and_height(baseline["frame"], delta, at)
-        for delta in (now[known], before[known], now[known] - before[known])
-    )
+    now, before = _shared(document["control"], baseline["control"])
+    row_of = {name: row for row, name in enumerate(baseline["points"].values("id"))}
+    known = np.array([row for row, name in enumerate(now["id"]) if name in row_of], np.intp)
+    now, before = now[known], before[known]
+    at = _columns(baseline["points"], "x", "y", "z")[[row_of[name] for name in now["id"]]]
+    one, other = _columns(now, "dx", "dy", "dz"), _columns(before, "dx", "dy", "dz")
+    sizes = [difference_in_plan_and_height(baseline["frame"], delta, at) for delta in (one, other, one - other)]
     for k, kind in enumerate(("plan", "height")):
-        there = np.isfinite(one[k]) | np.isfinite(other[k])
-        yield from _sizes(kind, "control", [ids[known[n]] for n in np.flatnonzero(there)], size[k][there])
+        there = np.flatnonzero(np.isfinite(sizes[0][k]) | np.isfinite(sizes[1][k]))
+        yield from _sizes(kind, "control", now["id"][there].tolist(), sizes[2][k][there])
+
+
+def _rotations(document: Document, baseline: Document) -> Iterator[Difference]:
+    """Compare rotations by the angle of the rotation from one to the other, which no convention of angles changes."""
+    now, before = _shared(document["photos"], baseline["photos"])
+    one, other = _columns(now, *MATRIX), _columns(before, *MATRIX)
+    known = np.flatnonzero(~(np.isnan(one) & np.isnan(other)).all(axis=1))
+    # 2 sqrt(2) sin(angle / 2) is the length of the difference: exact for the smallest angles, unlike the cosine
+    half = np.minimum(np.linalg.norm(one - other, axis=1)[known] / math.sqrt(8.0), 1.0)
+    yield from _sizes("rotation", "photos", now["id"][known].tolist(), np.degrees(2.0 * np.arcsin(half)))
 
 
 def _sizes(kind: str, block: str, ids: list[str], sizes: Floats) -> Iterator[Difference]:
@@ -264,30 +278,15 @@ def _sizes(kind: str, block: str, ids: list[str], sizes: Floats) -> Iterator[Dif
         yield kind, block, name, size if math.isfinite(size) else math.inf
 
 
-def _rotations(document: Document, baseline: Document) -> Iterator[Difference]:
-    """Compare rotations by the angle of the rotation from one to the other, which no convention of angles changes."""
-    for now, before in _pairs(document["photos"], baseline["photos"]):
-        if now["rotation"] is None or before["rotation"] is None:
-            if now["rotation"] != before["rotation"]:
-                yield "rotation", "photos", now["id"], math.inf
-            continue
-        one, other = (np.array(row["rotation"], float).reshape(3, 3) for row in (now, before))
-        # 2 sqrt(2) sin(angle / 2) is the length of the difference: exact for the smallest angles, unlike the cosine
-        half = min(float(np.linalg.norm(one - other)) / math.sqrt(8.0), 1.0)
-        yield "rotation", "photos", now["id"], math.degrees(2.0 * math.asin(half))
+def _shared(now: Table, before: Table) -> tuple[Table, Table]:
+    """Return the rows that stand in both tables, by id, in the same order."""
+    row_of = {name: row for row, name in enumerate(before.values("id"))}
+    rows = [row for row, name in enumerate(now.values("id")) if name in row_of]
+    return now[rows], before[[row_of[name] for name in now["id"][rows]]]
 
 
-def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, Document]]:
-    """Return the records that stand in both lists, by id."""
-    known = {row["id"]: row for row in before}
-    return [(row, known[row["id"]]) for row in now if row["id"] in known]
-
-
-def _shared(now: list[Document], before: list[Document], keys: Sequence[str]) -> tuple[list[str], Floats]:
-    """Return the ids in both lists, and three numbers of each, now and before (2, n, 3); NaN where there is none."""
-    pairs = _pairs(now, before)
-    values = [[[row[key] for key in keys] for row in pair] for pair in pairs]
-    return [row["id"] for row, _ in pairs], np.array(values, float).reshape(-1, 2, 3).transpose(1, 0, 2)
+def _columns(table: Table, *keys: str) -> Floats:
+    return np.column_stack([table[key] for key in keys])
 
 
 def _set(kind: str, document: Document, baseline: Document, tolerances: Tolerances) -> Document:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photostrip.comparison.quantities import name_of
+from photostrip.comparison.quantities import names_of
 from photostrip.notes import Document
 
+WORDS = {"photos": "photo", "points": "point", "control": "given point", "strips": "strip", "models": "model"}
 Member = tuple[str, str, str]  # block, id, what it is
 
 
@@ -26,11 +27,9 @@ def _plain(member: Member) -> Document:
 
 
 def _ids(document: Document) -> Iterator[Member]:
-    for block, word in (("photos", "photo"), ("points", "point"), ("control", "given point"), ("strips", "strip")):
-        for row in document[block]:
-            yield block, row["id"], f"{word} {row['id']}"
-    for model in document["models"]:
-        yield "models", name_of("models", model), f"model {name_of('models', model)}"
+    for block, word in WORDS.items():
+        for name in names_of(document[block]):
+            yield block, name, f"{word} {name}"
 
 
 def _choices(document: Document) -> Iterator[Member]:
@@ -39,8 +38,9 @@ def _choices(document: Document) -> Iterator[Member]:
     yield "adjustment", "", f"adjustment {document['adjustment']}"
     for block in document.get("polynomials", []):
         yield "polynomials", block["strip"], f"degree {block['degree']} of strip {block['strip']}"
-        for axis, terms in block["terms"].items():
-            yield "polynomials", block["strip"], f"terms of {axis}, strip {block['strip']}: {' '.join(terms) or 'none'}"
+        for axis in "xyz":
+            terms = " ".join(document["polynomial_terms"].where(strip=block["strip"], axis=axis)["term"]) or "none"
+            yield "polynomials", block["strip"], f"terms of {axis}, strip {block['strip']}: {terms}"
     for row in document["points"]:
         if row["role"] != "new":
             yield "points", row["id"], f"{row['id']} is {row['role']}"
@@ -52,7 +52,7 @@ def _choices(document: Document) -> Iterator[Member]:
 
 def _rejected(document: Document) -> Iterator[Member]:
     for row in document["rejected"]:
-        if not row.get("readmitted", False):
+        if not row["readmitted"]:
             photos = " – ".join(photo for photo in (row["photo"], row["other_photo"]) if photo)
             where = f" on {photos}" if photos else ""
             yield "rejected", row["point"], f"{row['point']}{where}, {row['stage'].replace('_', ' ')}"

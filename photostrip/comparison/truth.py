@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import islice
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,33 +11,18 @@ from photostrip.arrays import Floats
 from photostrip.comparison.ground import east_north_up, level, plan_and_height
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
-from photostrip.result.description import Quantity, Table
-from photostrip.result.reading import MOST_FAULTS, faults_of
+from photostrip.result.description import block_at
+from photostrip.result.quantities import MATRIX
+from photostrip.result.reading import read
 from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 from photostrip.statistics import chi2_quantile
 
-SCHEMA = 1
+SCHEMA = 2  # of truth.json
 ROLES = ("new", "check", "control")
 PROBABLE = 0.95
 PARTS = ("plan", "height")
 COORDINATES = {"plan": 2, "height": 1}
 FIX = "simulate it again"  # for a truth that was edited
-
-_TEXT, _NUMBER = Quantity("", "text"), Quantity("", "number")
-_PLACE: Table = {"id": _TEXT, "x": _NUMBER, "y": _NUMBER, "z": _NUMBER}
-ERROR: Table = {
-    **dict.fromkeys(("kind", "photo", "point", "other", "axis"), _TEXT),
-    **dict.fromkeys(("size_um", "size_m"), _NUMBER),
-}
-FRAME: Table = {"crs": _TEXT, "axes": replace(_TEXT, many=True)}
-# What is compared of the truth, and the keys that must have a value.
-SHAPE: Table = {
-    "frame": FRAME,
-    "points": _PLACE,
-    "photos": {**_PLACE, "rotation": replace(_NUMBER, many=True)},
-    "errors": ERROR,
-}
-NEEDED = {"points": tuple(_PLACE), "photos": tuple(_PLACE), "errors": ("kind", "point")}
 
 
 def compare_with_truth(document: Document, truth: Document, files: tuple[str, str] = ("", "")) -> Document:
@@ -51,11 +34,11 @@ def compare_with_truth(document: Document, truth: Document, files: tuple[str, st
         which of them the result does not name, and how many measurements without one were rejected.
     Raises InputError when they are of different strips or frames, or one is not whole.
     """
-    _require_whole(truth, files[1])
+    truth = _whole(truth, files[1])
     with faults_of_edited("compared with the truth", (document, files[0]), errors=OF_VALUES):
         _require_same_frame(document, truth, files)
         return {
-            "photostrip_truth_comparison": SCHEMA,
+            "photostrip_truth_comparison": 1,
             "result": files[0],
             "truth": files[1],
             "name": document["name"],
@@ -65,36 +48,12 @@ def compare_with_truth(document: Document, truth: Document, files: tuple[str, st
         }
 
 
-def _require_whole(truth: Document, file: str) -> None:
+def _whole(truth: Document, file: str) -> Document:
     """Refuse a truth that was edited or is of another version, with every fault."""
     if truth.get("photostrip_truth") != SCHEMA:
         message = f"has the format {truth.get('photostrip_truth')!a:.40} of a truth"
         raise InputError(Fault(message, "result-schema", file, expected=str(SCHEMA), fix=FIX))
-    faults = faults_of(truth, file, SHAPE, FIX) or [
-        Fault("is missing, or empty", "result-value", file, key=key, expected=expected, fix=FIX)
-        for key, expected in islice(_missing(truth), MOST_FAULTS)
-    ]
-    if faults:
-        raise InputError(faults)
-
-
-def _missing(truth: Document) -> Iterator[tuple[str, str]]:
-    """Return the keys that have no value, with what is expected there."""
-    frame = truth.get("frame")
-    for key in FRAME:
-        if not isinstance(frame, dict) or frame.get(key) is None:
-            yield f"frame.{key}", "that of the simulation"
-    for block, keys in NEEDED.items():
-        rows = truth.get(block)
-        if not isinstance(rows, list):
-            yield block, "a list"
-            continue
-        for number, row in enumerate(rows):
-            yield from ((f"{block}[{number}].{key}", "a value") for key in keys if row.get(key) is None)
-    for number, row in enumerate(truth.get("photos") or ()):
-        found = row.get("rotation") or ()
-        if len(found) != 9 or not all(isinstance(value, int | float) for value in found):
-            yield f"photos[{number}].rotation", "nine numbers, row by row"
+    return read(truth, file, block_at("truth"), FIX)
 
 
 def _require_same_frame(document: Document, truth: Document, files: tuple[str, str]) -> None:
@@ -131,9 +90,9 @@ def _photos(document: Document, truth: Document) -> Document:
     rows = [row for row in document["photos"] if row["id"] in true and row["x"] is not None]
     sizes = plan_and_height(document["frame"], _places(rows), _places([true[row["id"]] for row in rows]))
     found = _in_parts([row["id"] for row in rows], sizes, {})
-    turned = [row for row in rows if row["rotation"] is not None]
+    turned = [row for row in rows if row["r11"] is not None]
     now, then = (
-        np.array([each["rotation"] for each in rows], float).reshape(-1, 9)
+        np.array([[each[name] for name in MATRIX] for each in rows], float).reshape(-1, 9)
         for rows in (turned, [true[row["id"]] for row in turned])
     )
     # 2 sqrt(2) sin(angle / 2) is the length of the difference of two rotations
@@ -192,7 +151,7 @@ def _errors(rejected: Sequence[Document], planted: Sequence[Document]) -> Docume
     wrong: set[tuple[str, str]] = set()
     missed = []
     for error in planted:
-        photo, points = error.get("photo", ""), [error["point"], *([error["other"]] if error.get("other") else [])]
+        photo, points = error["photo"] or "", [error["point"], *([error["other"]] if error.get("other") else [])]
         wrong |= {(photo, point) for point in points}
         named = any((photo, point) in rays for point in points) if photo else error["point"] in given
         if not named:

@@ -23,6 +23,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.network.observations import AFFINE, POINT, PRINCIPAL_DISTANCE, K, P, corrected, corrections
 from photostrip.network.problem import CALIBRATION, BundleCameras
 from photostrip.notes import Document
+from photostrip.result.quantities import MATRIX
 from photostrip.strip import lens_distortion
 from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
@@ -90,7 +91,7 @@ class Adjusted:
     @cached_property
     def level(self) -> Floats:
         """Rotations (m, 3, 3) from image axes to those of the frame at the perspective centres."""
-        return np.array([each["rotation"] for each in self.photos], float).reshape(-1, 3, 3)
+        return coordinates(self.photos, MATRIX).reshape(-1, 3, 3)
 
     @cached_property
     def rotations(self) -> Floats:
@@ -116,10 +117,10 @@ class Adjusted:
         row_of = {each["id"]: row for row, each in enumerate(self.points)}
         focal = {each["id"]: each["principal_distance_mm"] for each in self.document["cameras"]}
         measured: dict[str, list[Any]] = {each["id"]: [] for each in self.photos}
-        for each in self.document["residuals"]:
-            rows = zip(each["points"], each["vx_um"], each["vy_um"], each["used"], strict=True)
-            kept = measured.get(each["photo"], [])
-            kept += [(row_of[point], *found) for point, *found in rows if point in row_of and found[0] is not None]
+        rays = map(self.document["residuals"].values, ("photo", "point", "vx_um", "vy_um", "used"))
+        for photo, point, *ray in zip(*rays, strict=True):
+            if photo in measured and point in row_of and ray[0] is not None:
+                measured[photo].append((row_of[point], *ray))
         found = []
         for number, (kept, camera) in enumerate(zip(measured.values(), self.camera_of, strict=True)):
             columns = np.array(kept, float).reshape(-1, 4)
@@ -225,7 +226,7 @@ def adjusted(document: Document) -> Adjusted:
     """
     frame = document["frame"]
     ground, columns = _ground_frame(frame), _columns(frame["axes"])
-    photos = tuple(each for each in document["photos"] if each["rotation"] is not None)
+    photos = tuple(each for each in document["photos"] if each["r11"] is not None)
     points = tuple(document["points"])
     return Adjusted(
         document=document,
@@ -303,8 +304,9 @@ def _ground_frame(frame: Document) -> GroundFrame:
 def _camera(given: Document) -> Camera:
     """Return a camera of the document; without a format it is as large as its photos were measured."""
     size, lens = given["format_mm"], None
-    if given.get("lens"):
-        columns: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in given["lens"].items()}
+    if given["lens_model"] is not None:
+        stated = {key.removeprefix("lens_"): value for key, value in given.items() if key.startswith("lens_") and value}
+        columns: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in stated.items()}
         lens = Distortion(**columns)
     b1, b2 = given.get("pixel_affinity") or (0.0, 0.0)
     return Camera(

@@ -96,7 +96,7 @@ def _layers(block: Adjusted) -> Iterator[Layer]:
             records=records,
             description="differences adjusted minus given, metres",
         )
-    of_photos = [_of_photo(each, axes) for each in block.photos]
+    of_photos = [_of_photo(each, axes, block.document["angles"]) for each in block.photos]
     yield Layer(
         name="photos", kind=POINT, places=list(centers[:, None]), records=of_photos, description="perspective centres"
     )
@@ -129,13 +129,11 @@ def _of_given(given: Document, axes: Sequence[str]) -> Document:
     return _columns(given, ("id", "use", "rejected")) | differences | _columns(given, ("plan", "height", "normalised"))
 
 
-def _of_photo(photo: Document, axes: Sequence[str]) -> Document:
-    angles, sigma = photo["angles"], dict(photo.get("sigma") or {})
-    names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
-    values = angles["values"] or [None] * 3
-    found = _columns(photo, ("id", "strip")) | dict(zip(names, values, strict=True))
-    found |= _along("sigma_", axes, [sigma.get(each) for each in "xyz"])
-    found |= dict(zip([f"sigma_{name}" for name in names], sigma.get("angles") or [None] * 3, strict=True))
+def _of_photo(photo: Document, axes: Sequence[str], angles: Document) -> Document:
+    names = {f"angle_{k}": f"{name}_{angles['unit']}" for k, name in enumerate(angles["system"].split("-"), 1)}
+    found = _columns(photo, ("id", "strip")) | {name: photo[key] for key, name in names.items()}
+    found |= _along("sigma_", axes, [photo[f"sigma_{each}"] for each in "xyz"])
+    found |= {f"sigma_{name}": photo[f"sigma_{key}"] for key, name in names.items()}
     return found | _columns(photo, ("points", "image_rms_um"))
 
 

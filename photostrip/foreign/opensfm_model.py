@@ -18,16 +18,15 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.foreign.opensfm import POINT
-from photostrip.formats.output import json_encoder
+from photostrip.formats.output.result_json import on_one_line as text
 from photostrip.geodesy.ground_frame import true_axes
 from photostrip.notes import Document, counted
-from photostrip.project.schema.exports import ENDINGS
+from photostrip.project.keys import ENDINGS
 
 DISTORTION = ("k1", "k2", "k3", "p1", "p2")
 TRACKS = "tracks.csv"
 HEAD = "OPENSFM_TRACKS_VERSION_v2\n"
 OTHERS = "0.001\t128\t128\t128\t-1\t-1"  # scale of a feature, its colour, segmentation and instance: none of ours
-text = json_encoder.UNICODE.value
 
 
 def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | bytes], list[str]]:

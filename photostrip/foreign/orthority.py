@@ -17,8 +17,8 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
-from photostrip.formats.output import json_encoder
 from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.output.result_json import on_one_line as text
 from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles
@@ -26,7 +26,6 @@ from photostrip.notes import counted
 
 HEADER = ("filename", "x", "y", "z", "omega", "phi", "kappa", "camera")
 WITH_TABS = ("label", "X", "Y", "Z", "omega", "phi", "kappa")
-text = json_encoder.UNICODE.value
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 

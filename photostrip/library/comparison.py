@@ -11,6 +11,8 @@ from photostrip.comparison import Tolerances, compare_results
 from photostrip.errors import Fault, InputError
 from photostrip.library.result import RESULT, Result
 from photostrip.notes import Document, counted
+from photostrip.result.description import LEFT_OUT
+from photostrip.result.table import plain_of
 
 BASELINE = "baseline.json"
 TRUTH = "photostrip_truth"  # the key by which truth.json is known
@@ -94,14 +96,15 @@ def place_of(baseline: Path, *, update: bool = False) -> Path:
 
 def _opened(given: Result | str | PathLike[str] | Mapping[str, Any], name: str) -> tuple[Document, str]:
     """Return a document with what it is called in messages; a mapping has the name that is given."""
-    from photostrip.formats.output.result_json import checked, read_document
+    from photostrip.formats.output.result_json import checked, parsed
 
     if isinstance(given, Result):
         return given.document, given.name
     if isinstance(given, Mapping):
-        return (dict(given), "the truth") if TRUTH in given else (checked(dict(given), name), name)
+        return (dict(given), "the truth") if TRUTH in given else (checked(plain_of(dict(given)), name, LEFT_OUT), name)
     file = str(place_of(Path(given)))
-    return read_document(file, TRUTH), file
+    document = parsed(file)
+    return (document if TRUTH in document else checked(document, file, LEFT_OUT)), file
 
 
 def results_below(folder: Path) -> dict[str, Path]:
@@ -113,7 +116,7 @@ def results_below(folder: Path) -> dict[str, Path]:
 
 def _folders(above: Path, now: Mapping[str, Path], baselines: Path, allowed: Tolerances) -> Document:
     """Compare every result below a folder with the baseline of the same name below another."""
-    from photostrip.formats.output.result_json import read_result
+    from photostrip.formats.output.result_json import read_baseline
 
     if not baselines.is_dir():
         message = f"is no folder, and {above} is one of {counted(len(now), 'result')}"
@@ -123,7 +126,7 @@ def _folders(above: Path, now: Mapping[str, Path], baselines: Path, allowed: Tol
     for name in sorted(now.keys() & before.keys()):
         files = (str(now[name]), str(before[name]))
         try:
-            document, other = (read_result(file) for file in files)
+            document, other = read_baseline(files[0]), read_baseline(files[1])
             found.append({"folder": name} | compare_results(document, other, allowed, files))
         except InputError as error:
             refused += [

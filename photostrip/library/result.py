@@ -11,8 +11,8 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
+from photostrip.formats.output.result_json import checked
 from photostrip.notes import Document, named
-from photostrip.result.records import as_lists
 
 if TYPE_CHECKING:
     from photostrip.formats.text.writing import Content
@@ -40,47 +40,38 @@ class Result:
         read: Sequence[str | PathLike[str]] = (),
         exports: Sequence[str] = (),
     ) -> None:
-        self._document = document
+        self.document: Document = document if not isinstance(document.get("points"), dict) else _checked(document)
+        """The content of result.json: blocks of keys, and tables; ``document["points"]["x"]`` is an array."""
         self._read = read
         self.computed = computed
         """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
         self._resolved = resolved
         self._exports = exports
 
-    @cached_property
-    def document(self) -> Document:
-        """The content of result.json: plain dictionaries, lists, texts and numbers."""
-        return dict(as_lists(self._document))
-
-    @property
-    def in_columns(self) -> Document:
-        """The same with its records as columns, as it is printed and written: a fifth of the memory."""
-        return self._document
-
     @property
     def name(self) -> str:
         """Name of the project."""
-        return str(self._document["name"])
+        return str(self.document["name"])
 
     @property
     def status(self) -> str:
         """The verdict in one word: good, unverified, look or failed."""
-        return str(self._document["status"])
+        return str(self.document["status"])
 
     @property
     def crs(self) -> str:
         """Reference system of all ground coordinates, as a project has it: a code, a PROJ string, WKT, or local."""
-        return str(self._document["frame"]["crs"])
+        return str(self.document["frame"]["crs"])
 
     @property
     def accuracy(self) -> str:
         """How good the points are, in one sentence."""
-        return str(self._document["verdict"]["accuracy"])
+        return str(self.document["verdict"]["accuracy"])
 
     @property
     def summary(self) -> Document:
         """Sigma0, scales, and the differences at control and check points."""
-        return dict(self._document["summary"])
+        return dict(self.document["summary"])
 
     @cached_property
     def points(self) -> Table:
@@ -95,7 +86,7 @@ class Result:
     @cached_property
     def pairs(self) -> Table:
         """Relative orientation of the pairs, or the independent models: elements, parallaxes, scale."""
-        return self._table("pairs")
+        return self._table("models")
 
     @cached_property
     def strips(self) -> Table:
@@ -134,9 +125,9 @@ class Result:
 
     def _table(self, name: str) -> Table:
         from photostrip.library.table import Table
-        from photostrip.result.tables import table_of
 
-        return Table(name, table_of(self._document, name), self._document.get("frame"))
+        table = self.document[name]
+        return Table(name, {key: table[key] for key in table.columns}, table.quantities, self.document["frame"])
 
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
@@ -195,14 +186,14 @@ class Result:
         if form == "json":
             from photostrip.formats.output.result_json import to_json
 
-            return to_json(self._document)
+            return to_json(self.document)
         if unknown := sorted(set(sections) - set(SectionName)):
             message = f"the report has no section {', '.join(unknown)}"
             raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
         if self.computed is not None:
-            return _rendered(self._document, form, sections, everything=everything)
-        with faults_of_edited("reported", (self._document, self.name)):
-            document = as_reported(self._document, self.name)
+            return _rendered(self.document, form, sections, everything=everything)
+        with faults_of_edited("reported", (self.document, self.name)):
+            document = as_reported(self.document, self.name)
             sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
             return _rendered(document, form, sections, everything=everything)
 
@@ -217,7 +208,7 @@ class Result:
         """
         from photostrip.result.statement.accuracy_statement import statement_document
 
-        return statement_document(self._document, self.name, classes_cm)
+        return statement_document(self.document, self.name, classes_cm)
 
     def trace(self, form: str = "text") -> str:
         """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.
@@ -241,8 +232,8 @@ class Result:
         from photostrip.formats.output.result_files import beside_json
         from photostrip.formats.output.result_json import json_pieces
 
-        tables = beside_json(self._document, self._resolved, self.computed)
-        return tables | {RESULT: json_pieces(self._document)}
+        tables = beside_json(self.document, self._resolved, self.computed)
+        return tables | {RESULT: json_pieces(self.document)}
 
     def _exported(self) -> dict[str, str | bytes]:
         if not self._exports:
@@ -292,7 +283,7 @@ class Result:
 
         rows = []
         for role in ("control", "check"):
-            found: Document = self._document["summary"].get(role) or {}
+            found: Document = self.document["summary"].get(role) or {}
             for part in ("plan", "height"):
                 each = found.get(part)
                 if each and each.get("count"):
@@ -308,7 +299,7 @@ def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, 
     if form == "html":
         from photostrip.report.html import to_html
 
-        return to_html(as_lists(document))  # its tables are looped over often
+        return to_html(document)
     from photostrip.report.page import layout, text
     from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
 
@@ -318,6 +309,11 @@ def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, 
     return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
 
 
+def _checked(document: Document) -> Document:
+
+    return checked(document, "the result")
+
+
 def _require_form(form: str, known: Sequence[str]) -> None:
     if form not in known:
         message = f"there is no form {form!r}: {', '.join(known)}"
@@ -325,13 +321,13 @@ def _require_form(form: str, known: Sequence[str]) -> None:
 
 
 def read_result(path: str | PathLike[str]) -> Result:
-    """Read a saved result: a result.json, or the folder that holds it.
+    """Read a saved result: a result.json, the folder that holds it, or a baseline.
 
     Raises InputError with every fault of the file.
     """
     from pathlib import Path
 
-    from photostrip.formats.output.result_json import read_result as read
+    from photostrip.formats.output.result_json import read_baseline
 
     file = Path(path)
-    return Result(read(str(file / RESULT if file.is_dir() else file)))
+    return Result(read_baseline(str(file / RESULT if file.is_dir() else file)))

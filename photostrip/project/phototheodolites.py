@@ -10,7 +10,7 @@ import numpy as np
 
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.tables import Table
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     Before,
     FirstSchema,

@@ -13,6 +13,7 @@ from photostrip.pipeline.inputs import BUNDLE, POLYNOMIAL, SIMILARITY
 from photostrip.pipeline.results import Result
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
+from photostrip.result.table import Table
 
 ROTATION = {
     "projected": "grid east, grid north and the ellipsoid's normal at the perspective centre",
@@ -25,10 +26,11 @@ EFFECTS = ("principal point", "distortion", "refraction")
 MEANT_OF_PHOTOS = ("vx_um, vy_um", "q_um")
 MEANT_OF_MODELS = {
     "_um": "micrometres in the model; of ground differences at model scale",
-    "rotation": "of photos: not known from model coordinates; of models: rows of the matrix that takes model axes to "
+    "r11 to r33": "of photos: not known from model coordinates; of models: rows of the matrix that takes model axes to "
     "the axes along, across, up of the strip",
     "vx_um, vy_um, vz_um": "model after minus model before at their common points, along the axes of the model before",
 }
+LENS = "model", "direction", "k", "p", "b", "radius", "distortion"
 CURVATURE = "earth curvature"  # named with the other ways to treat it
 
 
@@ -42,9 +44,9 @@ def conventions_of(result: Result) -> Document:
         "dx, dy, dz": f"adjusted minus given, metres, along {', '.join(frame.axes)}",
         "plan, height": "length of a difference in plan and difference in height, metres",
         "_um": "micrometres in the photo; of ground differences at photo scale",
-        "rotation": "rows of the matrix that takes image axes (x right, y up, the camera looks along -z) to "
+        "r11 to r33": "rows of the matrix that takes image axes (x right, y up, the camera looks along -z) to "
         f"{ROTATION[frame.kind]}",
-        "angles": f"{result.settings.angle_system}, {result.settings.angle_unit}",
+        "angle_1 to angle_3": f"{result.settings.angle_system}, {result.settings.angle_unit}",
         "vx_um, vy_um": "image residuals, measured minus computed, under the final orientations and points",
         "q_um": "y parallax y1 - y2 in the base frame; an image coordinate is better by the square root of 2",
         "along, across, up": "X along the strip, Y to its left, Z up: the axes of the polynomials",
@@ -77,10 +79,15 @@ def settings_of(result: Result) -> Document:
     return found
 
 
-def cameras_of(result: Result) -> list[Document]:
-    """Return the list ``cameras``, in the order of the strips."""
+def angles_of(result: Result) -> Document:
+    """Return the block ``angles``: what the three angles of a photo are."""
+    return {"system": result.settings.angle_system, "unit": result.settings.angle_unit}
+
+
+def cameras_of(result: Result) -> Table:
+    """Return the table ``cameras``, in the order of the strips."""
     cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
-    return [
+    rows = [
         {
             "id": name,
             "principal_distance_mm": camera.principal_distance,
@@ -92,23 +99,19 @@ def cameras_of(result: Result) -> list[Document]:
         }
         for name, camera in cameras.items()
     ]
+    return Table.of_rows("cameras", rows)
 
 
 def _image_of(result: Result, camera: Camera) -> Document:
-    """Return what makes measured image coordinates of a camera from ideal ones, as far as there is something."""
+    """Return what makes measured image coordinates of a camera from ideal ones; None where there is nothing."""
     singles = [strip.photos[0] for strip in result.inputs.strips if len(strip.photos) == 1 and strip.camera == camera]
-    found: Document = {
+    lens: Document = {} if camera.distortion is None else asdict(camera.distortion)
+    return {
         "pixel_size_mm": camera.pixel_size,
         "pixel_affinity": list(camera.pixel_affinity) if any(camera.pixel_affinity) else None,
-        "lens": camera.distortion
-        and {
-            key: list(value) if isinstance(value, tuple) else value
-            for key, value in asdict(camera.distortion).items()
-            if value
-        },
+        **{f"lens_{key}": lens.get(key) or None for key in LENS},
         "single_photos": singles,
     }
-    return {key: value for key, value in found.items() if value}
 
 
 def corrections_of(result: Result) -> Document:

@@ -8,27 +8,44 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from pathlib import Path
+from typing import Any
 
+SCHEMA = 2  # number of the format of result.json
 LIST = " list"
 KINDS = {"text", "word", "count", "flag", "any"}
+BESIDE = {"refined", "truth"}  # what is described and not in result.json
+# What a baseline is without: what is ours, what the other numbers are made of, and what is made of them.
+LEFT_OUT = (
+    "version",
+    "statement",
+    "certificate",
+    "residuals",
+    "parallaxes",
+    "link_residuals",
+    "covariances",
+    "fiducial_marks",
+)
 BRACES = re.compile(r"\{([^}]*)\}")
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """The value of a key, or each number of the list that stands there."""
+    """The value of a key, or each value of a column."""
 
     meaning: str
     kind: str  # text, word (one of a few), count, flag, number, any (described elsewhere)
     unit: str = ""  # m, um, deg, ...; empty for ratios; frame: that of its coordinates; angle: that of its angles
     decimals: int | None = None
     digits: int | None = None  # significant ones, where a number has no natural size
-    unit_key: str = ""  # key of the same record that names the unit
+    unit_key: str = ""  # key of the same block or table that names the unit
     many: bool = False  # whether a list of such values stands there
+    optional: bool = False  # whether it may be missing, where a kind of project does not have it
+    # kind of tolerance by which two results are compared; name: a column that names its rows; empty: not compared
+    compared: str = ""
 
     @classmethod
     def of(cls, form: str, meaning: str) -> Quantity:
-        """Read a form, as ``um 2``, ``ratio 4 digits``, ``by unit``, ``any m``, ``text`` or ``text list``."""
+        """Read a form, as ``um 2``, ``ratio 4 digits``, ``by unit``, ``frame``, ``any m`` or ``text list``."""
         if form.endswith(LIST):
             return replace(cls.of(form.removesuffix(LIST), meaning), many=True)
         kind, *rest = form.split()
@@ -36,38 +53,56 @@ class Quantity:
             return cls(meaning, kind, "".join(rest))
         if kind == "by":
             return cls(meaning, "number", unit_key=rest[0])
+        if not rest:
+            return cls(meaning, "number", kind)
         places, unit = int(rest[0]), "" if kind == "ratio" else kind
         if rest[1:]:
             return cls(meaning, "number", unit, digits=places)
         return cls(meaning, "number", unit, decimals=places)
 
 
-Table = dict[str, "Quantity | Table"]
+class Block(dict[str, Any]):
+    """What stands under the keys of a block: quantities, blocks and tables."""
+
+    optional = False  # whether it may be missing, where a kind of project does not have it
+
+
+class Columns(Block):
+    """What the columns of a table are."""
+
+
+def described() -> Block:
+    """Return what stands under each key of a result, blocks within blocks; tables are ``Columns``."""
+    return Block((key, entry) for key, entry in _everything().items() if key not in BESIDE)
 
 
 @cache
-def described() -> Table:
-    """Read the description: what stands under each key of a result; the records of a list are described once."""
-    found: Table = {}
-    blocks = [found]
+def _everything() -> Block:
+    found = Block()
+    places = [found]
     for line in Path(__file__).with_name("quantities.txt").read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
-            blocks = [table_at(path, found) for path in _expanded(line.strip("[]"))]
+            kind = Columns if line.startswith("[[") else Block
+            places = [_made(found, path, kind) if path else found for path in _expanded(line.strip("[]?"))]
+            for place in places:
+                place.optional = line.endswith("?")
         elif line and not line.startswith("#"):
-            key, form, meaning = line.split(" | ")
-            entry = Quantity.of(form, meaning)
-            for path in _expanded(key) if "{" in key else (key,):
+            keys, form, meaning, *compared = line.split(" | ")
+            entry = replace(Quantity.of(form, meaning), optional=keys.endswith("?"), compared="".join(compared))
+            for path in _expanded(keys.removesuffix("?")):
                 above, _, last = path.rpartition(".")
-                for block in blocks:
-                    table_at(above, block)[last] = entry
+                for place in places:
+                    (_made(place, above, Block) if above else place)[last] = entry
     return found
 
 
-@cache
-def lists() -> frozenset[str]:
-    """Return the blocks that are lists of records, by the keys that lead to them."""
-    lines = Path(__file__).with_name("quantities.txt").read_text(encoding="utf-8").splitlines()
-    return frozenset(path for line in lines if line.startswith("[[") for path in _expanded(line.strip("[]")))
+def _made(above: Block, path: str, kind: type[Block]) -> Block:
+    """Return the block or the table below a block, made where it is not there."""
+    *blocks, last = path.split(".")
+    for key in blocks:
+        above = above.setdefault(key, Block())
+    made: Block = above.setdefault(last, kind())
+    return made
 
 
 def _expanded(path: str) -> Iterator[str]:
@@ -77,20 +112,17 @@ def _expanded(path: str) -> Iterator[str]:
         yield "".join(part for pair in zip(fixed[::2], (*names, ""), strict=True) for part in pair)
 
 
-def table_at(path: str, within: Table | None = None) -> Table:
-    """Return what is described below a block, as ``strips`` or ``precision.along``; empty when nothing is."""
-    found = described() if within is None else within
-    for key in path.split(".") if path else ():
-        below = found.setdefault(key, {})
-        if isinstance(below, Quantity):
-            raise KeyError(path)
-        found = below
-    return found
+def block_at(path: str) -> Block:
+    """Return what is described below a block, as ``precision.check``, or of a table, as ``precision.along``."""
+    place = _everything()
+    for key in path.split("."):
+        place = place[key]
+    return place
 
 
 def quantity_at(path: str) -> Quantity | None:
     """Find a key by the keys that lead to it; what stands below a key that is described as a whole belongs to it."""
-    found: Quantity | Table | None = described()
+    place: object = described()
     for key in path.split("."):
-        found = found.get(key) if isinstance(found, dict) else found
-    return found if isinstance(found, Quantity) else None
+        place = place.get(key) if isinstance(place, Block) else place
+    return place if isinstance(place, Quantity) else None

@@ -1,4 +1,4 @@
-"""The document of a result: one plain dictionary, the content of result.json; everything else is rendered from it."""
+"""The document of a result: blocks of keys and tables, the content of result.json; everything else comes from it."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from photostrip.result.adjustment import (
     rejected,
     strips,
 )
+from photostrip.result.description import SCHEMA
 from photostrip.result.numbers import natural_rank
 from photostrip.result.points import (
     checked,
@@ -30,16 +31,15 @@ from photostrip.result.points import (
     precision,
 )
 from photostrip.result.statement.evidence import statement_of
+from photostrip.result.table import Table, in_frame
 from photostrip.result.verdict import verdict_of
-
-SCHEMA = 1
 
 
 def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     """Turn a result into the content of result.json.
 
     notes: what was noticed before the run, while the project was read; they come first.
-    Returns text, numbers, None, lists and dictionaries only; the same for the same inputs, without times and paths.
+    Returns text, numbers, None, lists, dictionaries and tables; the same for the same inputs, without times and paths.
         Numbers are rounded to decimals that lie well below what they are good for.
     """
     rank = natural_rank(result.refined.observations.point_ids)
@@ -54,6 +54,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     body: Document = {
         "adjustment": conventions.adjustment_of(result),
         "frame": ground.frame_of(result),
+        "angles": conventions.angles_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
         "counts": counts | checked.counts_of(points),
@@ -62,8 +63,8 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "corrections": conventions.corrections_of(result),
         "cameras": conventions.cameras_of(result),
         **image_coordinates.fiducials_of(result),
-        "strips": [strips.strip_of(result, each) for each in result.strips],
-        "absolute": [strips.absolute_of(each) for each in result.strips],
+        "strips": Table.of_rows("strips", (strips.strip_of(result, each) for each in result.strips)),
+        "absolute": Table.of_rows("absolute", map(strips.absolute_of, result.strips)),
         **strips.polynomials_of(result),
         **precision.precision_of(result, found),
         **cross_validation.cross_validation_of(result),
@@ -74,18 +75,19 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "ties": ground.ties_of(result, rank),
         "rejected": taken_out,
         "not_determined": ground.not_determined_of(result),
-        "findings": [_finding(each) for each in result.findings],
-        "notes": [_note(note) for note in (*said, *lost, *unchecked)],
+        "findings": Table.of_rows("findings", map(_finding, result.findings)),
+        "notes": Table.of_rows("notes", map(_note, (*said, *lost, *unchecked))),
         "models": links.models_of(result) if result.model_strips else pairs.models_of(result),
         **({"links": links.links_of(result)} if result.model_strips else {}),
         **deformation.deformations_of(result),
         "junctions": junctions.junctions_of(result),
-        "photos": photos.photos_of(result, images),
+        **photos.photos_of(result, images),
         "points": points,
         "residuals": bundle.with_reliability(result, images, photos.residuals_of(result, images)),
         "parallaxes": pairs.parallaxes_of(result, rank),
         **({"link_residuals": links.residuals_of(result, rank)} if result.model_strips else {}),
     }
+    body = in_frame(body)
     verdict = verdict_of(body)
     head = {
         "photostrip_result": SCHEMA,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from itertools import chain
 from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.units import MICROMETRES
@@ -26,7 +25,6 @@ ROTATION = 12  # decimals of direction cosines
 SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
-AT_ONCE = 2000  # numbers of a column that are read together, for the sake of memory
 SIGNS = ("utf-8", "surrogatepass")  # in the order of the signs
 WHOLE_NUMBERS = re.compile("([0-9]+)")
 TENS = 10.0 ** np.arange(23)  # those that a float holds exactly
@@ -44,37 +42,6 @@ def rounded(values: ArrayLike | float, decimals: int) -> Plain:
 def to_decimals(values: ArrayLike, decimals: int) -> Floats:
     """Round numbers to decimals, never to -0."""
     return np.asarray(np.round(np.asarray(values, float), decimals) + 0.0)
-
-
-class RoundedColumn(Sequence[Plain]):
-    """Rounded numbers, or rows of them, counts or flags, kept as an array in a quarter of the memory.
-
-    None stands for what is no number.
-    """
-
-    def __init__(self, values: NDArray[Any]) -> None:
-        self.values = values
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __getitem__(self, place: int | slice) -> Plain:
-        if isinstance(place, slice):
-            return RoundedColumn(self.values[place])
-        if self.values.ndim > 1:
-            return plain(self.values[place])
-        found = self.values.item(place)
-        return found if isfinite(found) else None
-
-    def __iter__(self) -> Iterator[Plain]:
-        parts = (plain(self.values[start : start + AT_ONCE]) for start in range(0, len(self), AT_ONCE))
-        return chain.from_iterable(parts)
-
-    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:  # noqa: FBT001 (numpy asks so)
-        return np.asarray(self.values, dtype, copy=copy)
-
-    def taken(self, order: Numbers) -> RoundedColumn:
-        return RoundedColumn(self.values[order])
 
 
 def plain(values: NDArray[Any]) -> Plain:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from photostrip.notes import Document
-from photostrip.result.records import column_of
 from photostrip.statistics import chi2_p_value, f_p_value
 
 PARTS = "plan", "height"
@@ -39,7 +38,7 @@ def probabilities(document: Document) -> dict[str, float]:
     seen = {CHECKS: _checks(document), LEFT_OUT: document.get("cross_validation", {}).get("p")}
     made = {name: p for name, p in seen.items() if p is not None}
     common = [each["p"] for each in document.get("common_deformation", {}).values() if each["p"] is not None]
-    single = [row["p"] for row in document.get("deformations", []) if row.get("p") is not None]  # of all models
+    single = [row["p"] for row in document.get("deformations", []) if row["p"] is not None]  # of all models
     found = {
         SIGMA0: [2 * _larger(sigma0_ratio(document), document["summary"]["redundancy"])],
         RESIDUALS: [2 * _larger(residuals_ratio(document), 2 * document["counts"]["image_points_used"])],
@@ -77,7 +76,7 @@ def _larger(ratio: float, redundancy: int) -> float:
 
 def pairs(document: Document) -> list[Pair]:
     """Return what every pair's sigma0 says, beside the other pairs and beside what is stated."""
-    columns = (column_of(document["models"], key) for key in ("sigma0_um", "redundancy"))
+    columns = (document["models"].values(key) for key in ("sigma0_um", "redundancy"))
     known = [(k, found, own) for k, (found, own) in enumerate(zip(*columns, strict=True)) if found is not None]
     squares, redundancy = sum(own * found**2 for _, found, own in known), sum(own for _, _, own in known)
     tests, given = 2 * len(known), stated(document)

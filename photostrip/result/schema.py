@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from photostrip.result.description import Quantity, Table, described
-from photostrip.result.document import SCHEMA
+from photostrip.result.description import SCHEMA, Block, Columns, Quantity, described
 
 URI = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {"text": "string", "word": "string", "count": "integer", "flag": "boolean", "number": "number"}
@@ -16,8 +15,8 @@ WORDS = {"text": "text", "word": "word", "count": "count", "flag": "true or fals
 def result_schema() -> dict[str, Any]:
     """Return the JSON Schema of result.json.
 
-    Every key may be null, where there is no value, and may be missing, where a kind of project does not have it; the
-    three that are always there are required. A list of records is described by the keys of one.
+    Every key may be null, where there is no value. A baseline holds a part of a result: three keys are required, and of
+    each table that is there the columns that it always has. A table is a block of columns, each a list.
     """
     blocks: dict[str, Any] = {}
     found = _block(described(), "", blocks)
@@ -33,17 +32,21 @@ def result_page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _block(table: Table, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
-    """Describe a block of keys; the blocks below it go into `blocks` by the keys that lead to them."""
+def _block(block: Block, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
+    """Describe a block of keys or columns; what lies below it goes into `blocks` by the keys that lead to it."""
+    if isinstance(block, Columns):
+        columns = {key: {"type": "array", "items": _value(entry)} for key, entry in block.items()}
+        required = [key for key, entry in block.items() if not entry.optional]
+        return {"type": "object", "properties": columns, "required": required}
     found: dict[str, Any] = {}
-    for key, entry in table.items():
+    for key, entry in block.items():
         path = f"{above}.{key}" if above else key
         if isinstance(entry, Quantity):
             found[key] = _value(entry)
         else:
             blocks[path] = _block(entry, path, blocks)
             one = {"$ref": f"#/$defs/{path}"}
-            found[key] = {"anyOf": [one, {"type": "array", "items": one}, {"type": "null"}]}
+            found[key] = {"anyOf": [one, {"type": "null"}]} if entry.optional else one
     return {"type": "object", "properties": found}
 
 
@@ -53,12 +56,7 @@ def _value(entry: Quantity) -> dict[str, Any]:
     kind = "number" if entry.kind == "any" and entry.unit else entry.kind  # its decimals are those of its frame
     if kind in TYPES:
         one: dict[str, Any] = {"type": [TYPES[kind], "null"]}
-        # a matrix is a list of its rows
-        found |= (
-            {"type": ["array", "null"], "items": {"anyOf": [one, {"type": "array", "items": one}]}}
-            if entry.many
-            else one
-        )
+        found |= {"type": ["array", "null"], "items": one} if entry.many else one
     if unit := _unit(entry):
         found["x-unit"] = unit
     if entry.decimals is not None:
@@ -74,8 +72,8 @@ def _unit(entry: Quantity) -> str:
     return of.get(entry.unit, entry.unit) or WORDS.get(entry.kind, "")
 
 
-def _quantities(table: Table, above: str) -> Iterator[tuple[str, Quantity]]:
-    for key, entry in table.items():
+def _quantities(block: Block, above: str) -> Iterator[tuple[str, Quantity]]:
+    for key, entry in block.items():
         path = f"{above}.{key}" if above else key
         if isinstance(entry, Quantity):
             yield path, entry

@@ -17,6 +17,7 @@ from photostrip.result.numbers import Plain, rms
 from photostrip.result.points.given import Differences, of_used
 from photostrip.result.points.photos import ImageResiduals, ground_sample_distance
 from photostrip.result.quantities import record
+from photostrip.result.table import Table
 
 # Name of a tolerance in the project file: where its value stands in the summary, and its unit.
 TOLERANCES: dict[str, tuple[tuple[str, ...], str]] = {
@@ -205,8 +206,8 @@ def _part(values: Floats, scale: Floats, rows: Flags, ids: tuple[str, ...]) -> D
     }
 
 
-def tolerances_of(result: Result, summary: Document) -> list[Document]:
-    """Return the list ``tolerances``: what the project allows and what it got.
+def tolerances_of(result: Result, summary: Document) -> Table:
+    """Return the table ``tolerances``: what the project allows and what it got.
 
     A tolerance without a value, as that of check points where there are none, counts as failed: what cannot be shown
     to be kept is not kept.
@@ -219,4 +220,4 @@ def tolerances_of(result: Result, summary: Document) -> list[Document]:
             value = value[key]
         passed = value is not None and value <= limit
         found.append({"name": name, "value": value, "limit": limit, "unit": unit, "passed": passed})
-    return found
+    return Table.of_rows("tolerances", found)

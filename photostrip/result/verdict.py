@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import compress, groupby
+from itertools import groupby
 from operator import attrgetter, itemgetter
 from typing import Any
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import LOST_SAY, Document, before, counted, listed
 from photostrip.result import own_tests
-from photostrip.result.quantities import records
-from photostrip.result.records import column_of
+from photostrip.result.table import Table
 from photostrip.statistics import SECOND_LOOK, SLIGHTLY, TEST_LEVEL, normal_quantile
 
 Tests = Mapping[str, float]  # probabilities by chance, of ``own_tests``
@@ -59,7 +58,7 @@ def verdict_of(document: Document) -> Document:
         "accuracy": accuracy(document),
         "agreement": agreement,
         **verification,
-        "tests": records("verdict.tests", {"test": list(tests), "p": list(tests.values()), "level": TEST_LEVEL}),
+        "tests": Table.of("verdict.tests", {"test": list(tests), "p": list(tests.values()), "level": TEST_LEVEL}),
         "look_at": look_at,
     }
 
@@ -151,10 +150,16 @@ def _whole(document: Document, role: str) -> Document:
 
 def _given(document: Document, role: str, *keys: str) -> Iterator[tuple[Any, ...]]:
     """Give the values of some keys at the points of a role."""
-    left_out = role == "cross_validation"
-    points = document.get(role, {}).get("points", []) if left_out else document["control"]
-    values = zip(*(column_of(points, key, optional=key == "rejected") for key in keys), strict=True)
-    return values if left_out else compress(values, (each == role for each in column_of(points, "role")))
+    if role == "cross_validation":
+        if role not in document:
+            return iter(())
+        points = document[role]["points"]
+        columns = [[""] * len(points) if key == "rejected" else points.values(key) for key in keys]
+    else:
+        points = document["control"]
+        points = points[points["role"] == role]
+        columns = [points.values(key) for key in keys]
+    return zip(*columns, strict=True)
 
 
 def headline_rms(document: Document, role: str, part: str) -> Document:
@@ -329,11 +334,11 @@ def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]
 
 def _deformed(document: Document) -> Iterator[str]:
     """Name models that are bent or twisted beyond chance."""
-    odd = [row for row in document.get("deformations", []) if 2 * row.get("p", 1.0) < TEST_LEVEL]
-    odd.sort(key=lambda row: -max(abs(row[name]["at_corner_m"]) for name in TERMS))
+    odd = [row for row in document.get("deformations", []) if 2 * row["p"] < TEST_LEVEL]
+    odd.sort(key=lambda row: -max(abs(row[f"{name}_at_corner_m"]) for name in TERMS))
     for row in odd[:NAMED]:
-        name = max(TERMS, key=lambda name: abs(row[name]["t"]))
-        size, t = row[name]["at_corner_m"], row[name]["t"]
+        name = max(TERMS, key=lambda name: abs(row[f"{name}_t"]))
+        size, t = row[f"{name}_at_corner_m"], row[f"{name}_t"]
         yield (
             f"the model of photos {row['left']} and {row['right']} is deformed ({name}): {size:.3f} m at a corner "
             f"against the middle, t = {t:.1f}"
@@ -353,9 +358,9 @@ def _photos(document: Document, tests: Tests) -> Iterator[str]:
     if ratio > PAIR_RATIO and tests[own_tests.RESIDUALS] < TEST_LEVEL <= tests[own_tests.SIGMA0]:
         text = f"rms {whole:.1f} µm, stated {given:.1f} µm"
         yield f"the image residuals under the final orientation are {ratio:.1f} times as large as stated: {text}"
-    rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
+    rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row["readmitted"]}
     lost, poor, losing = Counter(photo for photo, _ in rejected), [], []
-    columns = (column_of(document["photos"], key) for key in ("id", "image_rms_um", "points"))
+    columns = (document["photos"].values(key) for key in ("id", "image_rms_um", "points"))
     for name, known, points in zip(*columns, strict=True):
         rms, out, measured = known or 0, lost[name], lost[name] + points
         if whole and rms > PHOTO_RATIO * whole:
@@ -369,7 +374,7 @@ def _photos(document: Document, tests: Tests) -> Iterator[str]:
 
 
 def _rejected(document: Document) -> Iterator[str]:
-    used, gone = (sum(column_of(document["models"], key)) for key in ("points_used", "points_rejected"))
+    used, gone = (int(document["models"][key].sum()) for key in ("points_used", "points_rejected"))
     if gone > MANY_REJECTED * (used + gone):
         yield f"{gone} of {used + gone} points in pairs were rejected, {100 * gone / (used + gone):.0f} %"
 

@@ -177,7 +177,7 @@ def test_make_check_compares_and_watches_tolerances(tmp_path: Path, forked: Path
     again = folder.make("-j2", "check")
     assert (again.returncode, again.stdout.count("SAME:")) == (0, 2)
     baseline = json.loads((tmp_path / "a/baseline.json").read_text(encoding="utf-8"))
-    baseline["points"][0]["z"] += 1.0
+    baseline["points"]["z"][0] += 1.0
     (tmp_path / "a/baseline.json").write_text(json.dumps(baseline), encoding="utf-8")
     with (tmp_path / "b/project.yaml").open("a", encoding="utf-8") as opened:
         opened.write("tolerances: {check_rms_xy: 0.0001}\n")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import checked
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -24,8 +25,7 @@ UNDETERMINED = ("--set", "processing.self_calibration=[principal_distance]")  # 
 def run(capsys: pytest.CaptureFixture[str], project: Path, *options: str) -> dict[str, Any]:
     """Run a project and give its result."""
     assert main(["run", str(project), "--format", "json", *options]) == 0
-    document: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return document
+    return checked(json.loads(capsys.readouterr().out), "result.json")
 
 
 def simulated(folder: Path, spec: str, **changes: str) -> Path:
@@ -76,11 +76,11 @@ def test_the_classical_adjustment_stands_beside_it(capsys: pytest.CaptureFixture
     for role in ("control", "check"):
         assert classical[f"{role}_rms"] == {part: summary[role][part]["rms"] for part in ("plan", "height")}
     (strip,), (polynomial,) = classical["strips"], alone["polynomials"]
-    assert max(strip["degree"].values()) == polynomial["degree"]
+    assert max(strip["degree_plan"], strip["degree_height"]) == polynomial["degree"]
     assert "classical" not in alone
     assert main(["run", str(SAMPLE)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    degrees = "degree {plan} in plan and {height} in height".format(**strip["degree"])
+    degrees = "degree {degree_plan} in plan and {degree_height} in height".format(**strip)
     left = "{plan:.3f}/{height:.3f} m at check points".format(**classical["check_rms"])
     assert f"polynomials instead {degrees}; rms in plan/height" in said
     assert left in said

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -44,16 +43,17 @@ def test_edited_results_are_printed_or_refused(command: tuple[str, ...], tmp_pat
         ("counts.photos", "1" + "0" * 400, "holds a whole number that is too large; expected a whole number"),
         ("counts.photos", "true", "holds true; expected a whole number"),
         ("name", '"\\ud800"', "holds the text '\\ud800'; expected a text"),
-        ("points[0].id", "7", "holds 7; expected a text"),
-        ("photos[1].rotation", "0.5", "holds 0.5; expected a list"),
-        ("residuals[0].vx_um[2]", '"3"', "holds the text '3'; expected a number"),
-        ("control[2].measured", '"yes"', "holds the text 'yes'; expected true or false"),
-        ("strips[0]", "3", "holds 3; expected a block of keys"),
+        ("points.id[0]", "7", "holds 7; expected a text"),
+        ("control.strips[1]", "0.5", "holds 0.5; expected a list"),
+        ("residuals.vx_um[2]", '"3"', "holds the text '3'; expected a number"),
+        ("control.measured[2]", '"yes"', "holds the text 'yes'; expected true or false"),
+        ("strips", "3", "holds 3; expected a table: a block of columns, each a list"),
+        ("strips.base", "[]", "holds 0 values; expected 2, as many as its first column"),
         ("frame", "3", "holds 3; expected a block of keys"),
         ("frame", "[{}]", "holds a list; expected a block of keys"),
         ("summary", "null", "holds null; expected a block of keys"),
-        ("notes", "null", "holds null; expected a list of blocks"),
-        ("points", "{}", "holds a block of keys; expected a list of blocks"),
+        ("notes", "null", "holds null; expected a table: a block of columns, each a list"),
+        ("points", "[{}]", "holds a list; expected a table: a block of columns, each a list"),
         ("precision.check", "[]", "holds a list; expected a block of keys"),
         ("settings.relative", "[NaN]", "holds nan; expected a number"),
     ],
@@ -75,17 +75,17 @@ def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: 
     assert words in str(fault)
 
 
-@pytest.mark.parametrize(("command", "key"), [("report", "models[1].left"), ("compare", "models[1].left")])
+@pytest.mark.parametrize(("command", "key"), [("report", "models.left"), ("compare", "models.left")])
 def test_a_missing_key_is_told_with_all_that_lead_to_it(
     command: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
-    block, number, last = re.split(r"\[|\]\.", key)
-    del document[block][int(number)][last]
+    block, column = key.split(".")
+    del document[block][column]
     file = tmp_path / "result.json"
     file.write_text(to_json(document), encoding="utf-8")
     assert main([command, str(file), *([str(RESULT)] if command == "compare" else [])]) == 2
-    assert f"key '{key}' is missing" in capsys.readouterr().err
+    assert f"{key}: is missing" in capsys.readouterr().err
 
 
 def test_digits_by_the_thousand_are_refused(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_digits_by_the_thousand_are_refused(tmp_path: Path) -> None:
 def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
     document["name"] += ESCAPE
-    document["control"][0]["id"] = ESCAPE
+    document["control"]["id"][0] = ESCAPE
     file = tmp_path / "result.json"
     file.write_text(to_json(document), encoding="utf-8")
     assert read_result(str(file))["control"][0]["id"] == ESCAPE

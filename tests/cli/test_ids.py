@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ import pytest
 import yaml
 
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import read_result
 from photostrip.simulation.spec import Points
 from tests.loops import nonempty
 from tests.project.test_ids import ODD
@@ -70,7 +70,7 @@ def test_the_result_has_the_same_numbers_under_the_new_ids(
     both: tuple[Path, Path, dict[str, str], dict[str, str]],
 ) -> None:
     plain, odd, photos, points = both
-    one, two = (json.loads((each / "result.json").read_text(encoding="utf-8")) for each in (plain, odd))
+    one, two = (read_result(str(each / "result.json")) for each in (plain, odd))
     assert [two["name"], two["strips"][0]["id"], two["cameras"][0]["id"]] == [NAMES[2], NAMES[1], NAMES[0]]
     assert [row["id"] for row in two["photos"]] == PHOTOS
     there = {row["id"]: row for row in two["points"]}
@@ -106,7 +106,7 @@ def test_the_resolved_project_runs_and_gives_the_same(
     resolved.unlink()
     for name in ("points.csv", "photos.csv", "residuals.csv"):
         assert (tmp_path / "again" / name).read_bytes() == (odd / name).read_bytes()
-    one, two = (json.loads((each / "result.json").read_text(encoding="utf-8")) for each in (odd, tmp_path / "again"))
+    one, two = (read_result(str(each / "result.json")) for each in (odd, tmp_path / "again"))
     hashes = [each.pop("certificate")["result_sha256"] for each in (one, two)]  # it names the files, which are others
     assert one == two
     assert hashes[0] == hashes[1]
@@ -117,7 +117,7 @@ def test_the_report_shows_them(
 ) -> None:
     assert main(["report", str(both[1]), "--verbose", "--width", "200"]) == 0
     out = capsys.readouterr().out
-    document = json.loads((both[1] / "result.json").read_text(encoding="utf-8"))
+    document = read_result(str(both[1] / "result.json"))
     short = [row["id"] for row in document["control"] if len(row["id"]) < 12]
     assert short
     assert all(name in out for name in nonempty(short))

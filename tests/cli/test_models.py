@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import read_result
 from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
 from photostrip.simulation import Flight, Models, Spec, simulate
@@ -32,16 +33,14 @@ def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture
     assert main(["run", str(project), "-o", str(folder / "b"), "--quiet"]) == 0
     assert (folder / "a" / "result.json").read_bytes() == (folder / "b" / "result.json").read_bytes()
     printed = capsys.readouterr().out
-    document = json.loads((folder / "a" / "result.json").read_text(encoding="utf-8"))
-    assert [photo["rotation"] for photo in document["photos"]] == [None] * 6
-    assert [photo["angles"]["values"] for photo in document["photos"]] == [None] * 6
-    assert all(photo["x"] is not None and photo["sigma"]["x"] > 0 for photo in nonempty(document["photos"]))
+    document = read_result(str(folder / "a" / "result.json"))
+    assert document["photos"].values("r11") == document["photos"].values("angle_1") == [None] * 6
+    assert all(photo["x"] is not None and photo["sigma_x"] > 0 for photo in nonempty(document["photos"]))
     assert [len(document[name]) for name in ("links", "models", "junctions", "residuals")] == [4, 5, 0, 0]
     assert (document["summary"]["photo_scale"], document["cameras"]) == (None, [])
-    lines = (folder / "a" / "links.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "before,after,point,vx_um,vy_um,vz_um,test,used"
-    assert len(lines) == 1 + sum(len(link["points"]) for link in document["link_residuals"])
-    assert (folder / "a" / "photos.csv").read_text(encoding="utf-8").splitlines()[1].count(",") == 24
+    lines = (folder / "a" / "link_residuals.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "strip,before,after,point,vx_um,vy_um,vz_um,test,used"
+    assert len(lines) == 1 + len(document["link_residuals"])
     assert "links of the models" in printed
     assert "at model scale" in printed
     assert "Links of the models" in (folder / "a" / "report.html").read_text(encoding="utf-8")

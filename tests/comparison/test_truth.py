@@ -14,7 +14,10 @@ from scipy.stats import chi2
 
 import photostrip
 from photostrip.cli.main import main
+from photostrip.result.quantities import MATRIX
+from photostrip.result.table import rows_of
 from tests.loops import nonempty
+from tests.results import columns_of, rotation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,7 +81,7 @@ def test_true_errors_are_those_of_another_computation(frame: str) -> None:
         (result.points, "points", found["points"]),
         (result.photos, "photos", [found["photos"]]),
     ):
-        true = {each["id"]: [each[axis] for axis in "xyz"] for each in simulation.truth[rows]}
+        true = {each["id"]: [each[axis] for axis in "xyz"] for each in rows_of(simulation.truth[rows])}
         for block in blocks:
             part = table.where(role=block["role"]) if "role" in block else table
             now = np.column_stack([part[axis] for axis in "xyz"])
@@ -94,11 +97,12 @@ def test_true_errors_are_those_of_another_computation(frame: str) -> None:
 def test_angles_between_true_and_found_orientation() -> None:
     simulation, result = simulated("projected")
     truth = copy.deepcopy(simulation.truth)
-    by_id = {each["id"]: each for each in truth["photos"]}
+    by_id = {each["id"]: each for each in rows_of(truth["photos"])}
     turn = np.radians(0.3)
     about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-    for photo in nonempty(result.document["photos"]):
-        by_id[photo["id"]]["rotation"] = (about @ np.reshape(photo["rotation"], (3, 3))).ravel().tolist()
+    for photo in nonempty(result.photos):
+        by_id[photo["id"]].update(zip(MATRIX, (about @ rotation(photo)).ravel().tolist(), strict=True))
+    truth["photos"] = columns_of(list(by_id.values()))
     found = photostrip.compare(result, truth).document["photos"]["rotation"]
     assert found["rms"] == pytest.approx(0.3, abs=1e-6)
     assert found["max"] == pytest.approx(0.3, abs=1e-6)
@@ -108,7 +112,7 @@ def test_angles_between_true_and_found_orientation() -> None:
 def test_errors_over_their_standard_deviations(frame: str) -> None:
     simulation, result = simulated(frame)
     found = photostrip.compare(result, simulation.truth).document
-    true = {each["id"]: [each[axis] for axis in "xyz"] for each in simulation.truth["points"]}
+    true = {each["id"]: [each[axis] for axis in "xyz"] for each in rows_of(simulation.truth["points"])}
     order = [1, 0, 2] if frame == "north first" else [0, 1, 2]
     for block in nonempty(found["points"]):
         part = result.points.where(role=block["role"])
@@ -144,7 +148,7 @@ def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
     assert whole.document["errors"] == {"planted": 3, "missed": [], "sound_rejected": 0}
     document = copy.deepcopy(result.document)
     assert document["rejected"]
-    document["rejected"] = []
+    document["rejected"] = document["rejected"].where(photo="none")
     against = photostrip.compare(photostrip.Result(document), simulation.truth)
     assert [each["kind"] for each in against.document["errors"]["missed"]] == ["image", "swap", "control"]
     text = against.report()
@@ -152,7 +156,7 @@ def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
     for line in (
         "not found: image, photo 1003, point 1003-4 in y, 300.0 µm",
         "not found: control, point G05 in z, 3.000 m",
-        f"not found: swap, photo 1005, points 1005-1 and {simulation.truth['errors'][1]['other']}",
+        f"not found: swap, photo 1005, points 1005-1 and {simulation.truth['errors']['other'][1]}",
     ):
         assert line in text
 
@@ -160,32 +164,39 @@ def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
 def test_a_rejection_without_an_error_is_sound() -> None:
     simulation, result = planted(IMAGE, CONTROL, SWAP)
     truth = copy.deepcopy(simulation.truth)
-    truth["errors"] = []
+    truth["errors"] = {key: [] for key in truth["errors"]}
     found = photostrip.compare(result, truth)
     assert found.document["errors"] == {"planted": 0, "missed": [], "sound_rejected": len(result.rejected)}
     assert "no gross errors put in" in found.report()
 
 
 EDITS: dict[str, tuple[Callable[[Document], object], str]] = {
-    "a list for a number": (lambda truth: truth["points"][0].update(x=[1.0]), "points[0].x"),
-    "a text for a number": (lambda truth: truth["points"][0].update(x="1.0"), "points[0].x"),
-    "nothing for a number": (lambda truth: truth["photos"][1].update(z=None), "photos[1].z"),
-    "not a number": (lambda truth: truth["points"][2].update(y=float("nan")), "points[2].y"),
-    "a number without a square": (lambda truth: truth["points"][2].update(y=1e300), "points[2].y"),
-    "a list for an id": (lambda truth: truth["points"][0].update(id=["a"]), "points[0].id"),
-    "no frame": (lambda truth: truth.pop("frame"), "frame.crs"),
-    "a list for the frame": (lambda truth: truth.update(frame=[{}]), "frame.crs"),
+    "a list for a number": (lambda truth: put(truth, "points", "x", 0, [1.0]), "points.x[0]"),
+    "a text for a number": (lambda truth: put(truth, "points", "x", 0, "1.0"), "points.x[0]"),
+    "not a number": (lambda truth: put(truth, "points", "y", 2, float("nan")), "points.y[2]"),
+    "a number without a square": (lambda truth: put(truth, "points", "y", 2, 1e300), "points.y[2]"),
+    "a list for an id": (lambda truth: put(truth, "points", "id", 0, ["a"]), "points.id[0]"),
+    "no frame": (lambda truth: truth.pop("frame"), "frame"),
+    "a list for the frame": (lambda truth: truth.update(frame=[{}]), "frame"),
     "no points": (lambda truth: truth.pop("points"), "points"),
-    "a block for points": (lambda truth: truth.update(points={}), "points"),
+    "no coordinates": (lambda truth: truth["points"].pop("x"), "points.x"),
     "a text for points": (lambda truth: truth.update(points="all"), "points"),
-    "a rotation of two numbers": (lambda truth: truth["photos"][0].update(rotation=[1, 0]), "photos[0].rotation"),
-    "an empty rotation": (lambda truth: truth["photos"][0].update(rotation=[None] * 9), "photos[0].rotation"),
+    "a column too short": (lambda truth: truth["photos"].update(r13=[1.0]), "photos.r13"),
     "no errors": (lambda truth: truth.update(errors=None), "errors"),
-    "an error without a point": (lambda truth: truth.update(errors=[{"kind": "image"}]), "errors[0].point"),
-    "a text for a size": (lambda truth: truth.update(errors=[{**IMAGE, "size_um": "x"}]), "errors[0].size_um"),
-    "half a character": (lambda truth: truth.update(errors=[{**IMAGE, "point": "\ud800"}]), "errors[0].point"),
-    "another format": (lambda truth: truth.update(photostrip_truth=2), ""),
+    "a text for a size": (
+        lambda truth: truth.update(errors=columns_of([{**IMAGE, "size_um": "x"}])),
+        "errors.size_um[0]",
+    ),
+    "half a character": (
+        lambda truth: truth.update(errors=columns_of([{**IMAGE, "point": "\ud800"}])),
+        "errors.point[0]",
+    ),
+    "another format": (lambda truth: truth.update(photostrip_truth=1), ""),
 }
+
+
+def put(truth: Document, table: str, column: str, row: int, value: object) -> None:
+    truth[table][column][row] = value
 
 
 @pytest.mark.parametrize("edit", EDITS)
@@ -210,7 +221,6 @@ def test_the_truth_of_another_simulation_is_refused() -> None:
     with pytest.raises(photostrip.InputError, match=r"frame\.crs"):
         photostrip.compare(result, other.truth)
     strange = copy.deepcopy(simulated("projected")[0].truth)
-    for point in strange["points"]:
-        point["id"] += "x"
+    strange["points"]["id"] = [f"{name}x" for name in strange["points"]["id"]]
     with pytest.raises(photostrip.InputError, match="no point is in both"):
         photostrip.compare(result, strange)

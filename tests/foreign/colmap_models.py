@@ -10,6 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import photostrip
+from photostrip.result.table import rows_of
+from tests.results import rotation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -95,9 +97,9 @@ def simulated(folder: Path, **changes: object) -> Model:
     rows = [line.split(",") for line in simulation.files["observations.csv"].splitlines()[1:]]
     numbers: dict[str, int] = {}
     images = []
-    for number, photo in enumerate(simulation.truth["photos"]):
+    for number, photo in enumerate(rows_of(simulation.truth["photos"])):
         center = TO_MODEL.apply(SCALE * np.array([photo[name] for name in "xyz"])) + SHIFT
-        upright = np.array(photo["rotation"]).reshape(3, 3) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
+        upright = rotation(photo) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
         to_camera = (TO_MODEL * Rotation.from_matrix(upright)).inv()
         own = [row for row in rows if row[0] == photo["id"] and row[1][0] not in "GK"]  # control is marked by hand
         points = [numbers.setdefault(row[1], 5 * len(numbers) + 2) for row in own]

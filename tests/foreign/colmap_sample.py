@@ -11,7 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import photostrip
+from photostrip.result.table import rows_of
 from tests.foreign.colmap_models import SPEC, Model
+from tests.results import rotation
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -44,13 +46,13 @@ def write(folder: Path) -> None:
         ground={"crs": "EPSG:32633"},
     )
     rows = [line.split(",") for line in made.files["observations.csv"].splitlines()[1:]]
-    photos = made.truth["photos"]
+    photos = rows_of(made.truth["photos"])
     names = {photo["id"]: f"DJI_{number:04}.JPG" for number, photo in enumerate(photos, 1)}
     centers = np.array([[photo[axis] for axis in "xyz"] for photo in photos])
     numbers: dict[str, int] = {}
     images = []
     for number, (photo, place) in enumerate(zip(photos, centers - centers.mean(axis=0), strict=True), 1):
-        upright = np.reshape(photo["rotation"], (3, 3)) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
+        upright = rotation(photo) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
         to_camera = (TO_MODEL * Rotation.from_matrix(upright)).inv()
         own = [row for row in rows if row[0] == photo["id"] and row[1][0] not in "GK"]
         xy = np.round([[float(each) for each in row[2:4]] for row in own], 2)

@@ -10,7 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import photostrip
+from photostrip.result.table import rows_of
 from tests.foreign.colmap_models import K1, P1, P2, SPEC, F
+from tests.results import rotation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -50,8 +52,8 @@ def simulated(folder: Path, crs: str = "EPSG:32633", **changes: object) -> Docum
 def cameras(truth: Document, to_earth: Floats, origin: Floats) -> list[str]:
     """Give the photos with true orientations; `to_earth` turns ground axes (n, 3, 3), `origin` has the centres."""
     lines = []
-    for number, (photo, axes, center) in enumerate(zip(truth["photos"], to_earth, origin, strict=True)):
-        upright = axes @ np.array(photo["rotation"]).reshape(3, 3) * (1.0, -1.0, -1.0)
+    for number, (photo, axes, center) in enumerate(zip(rows_of(truth["photos"]), to_earth, origin, strict=True)):
+        upright = axes @ rotation(photo) * (1.0, -1.0, -1.0)
         matrix = np.eye(4)
         matrix[:3, :3] = TO_CHUNK.inv().as_matrix() @ upright
         matrix[:3, 3] = TO_CHUNK.inv().apply((center - origin.mean(axis=0)) / SCALE)
@@ -67,7 +69,7 @@ def cameras(truth: Document, to_earth: Floats, origin: Floats) -> list[str]:
 
 def markers(native: Path, truth: Document, *, sigmas: bool = True) -> tuple[list[str], list[str]]:
     """Give the control of a native project and its marks."""
-    cameras_of = {photo["id"]: 40 + number for number, photo in enumerate(truth["photos"])}
+    cameras_of = {photo["id"]: 40 + number for number, photo in enumerate(rows_of(truth["photos"]))}
     with (native / "observations.csv").open(encoding="utf-8") as file:
         rays = [row for row in csv.DictReader(file) if row["point"][0] in "GK"]
     with (native / "control.csv").open(encoding="utf-8") as file:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 import photostrip
 from photostrip.cli.main import main
 from photostrip.project.check import check_project
-from tests.foreign.colmap_models import OPENCV, name_of, simulated
+from tests.foreign.colmap_models import simulated
 from tests.foreign.converting import convert, refused, with_control
 from tests.loops import nonempty
 
@@ -39,24 +38,6 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
         given = [each for each in expected if each[0] in "GK"]
         assert [at[each][name] for each in given] == pytest.approx([expected[each][name] for each in given], abs=3e-4)
     assert any("laid on the control: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
-
-
-def test_camera_positions_say_where_the_model_lies(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native", gnss={"sigma": [0.03, 0.03, 0.05]})
-    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
-    rows = (tmp_path / "native" / "gnss.csv").read_text(encoding="utf-8").splitlines()
-    renamed = [f"{name_of(row.partition(',')[0])},{row.partition(',')[2]}" for row in rows[1:]]
-    (tmp_path / "block" / "gnss.csv").write_text("\n".join([rows[0], *renamed]) + "\n", encoding="utf-8")
-    project = tmp_path / "block" / "project.yaml"
-    with project.open("a", encoding="utf-8") as file:
-        file.write(
-            "camera_positions: {file: gnss.csv, crs: local, axes: [east, north, up], sigma: [0.03, 0.03, 0.05]}\n"
-        )
-    found = {each["id"]: each for each in photostrip.run(project).document["photos"]}
-    for line in nonempty(rows[1:]):
-        photo, *xyz = line.split(",")[:4]
-        at = [found[name_of(photo)][name] for name in "xyz"]
-        assert at == pytest.approx([float(each) for each in xyz], abs=0.3)
 
 
 def test_text_and_binary_are_the_same_project(tmp_path: Path) -> None:
@@ -193,10 +174,3 @@ def test_faults_of_a_binary_model_have_their_record(
     path = simulated(tmp_path / "native").write_binary(tmp_path / "model") / "images.bin"
     path.write_bytes(change(path.read_bytes()))
     assert f"images.bin: {told}" in refused(capsys, tmp_path / "model", tmp_path / "block")
-
-
-def test_unknown_models_of_a_binary_file_are_refused_by_name(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = replace(simulated(tmp_path / "native"), cameras={4: ("FOV", 9, 9, OPENCV[:5])}).write_binary(tmp_path)
-    assert "cameras.bin: camera 1 of 1: the model FOV has no counterpart" in refused(capsys, folder, tmp_path / "block")

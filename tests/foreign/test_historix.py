@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import read_result
 from tests.foreign.converting import convert, refused
 from tests.foreign.historix_blocks import FILES, OPTIONS, copied, plane, simulated, with_ties
 
@@ -24,7 +24,7 @@ def test_casa_grande_runs_with_tie_points_on_its_stations(tmp_path: Path) -> Non
     project = with_ties(tmp_path / "block", tied)
     assert main(["check", str(project), "-q"]) == 0
     assert main(["run", str(project), "-o", str(tmp_path / "run"), "-q"]) == 0
-    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    result = read_result(str(tmp_path / "run" / "result.json"))
     assert (len(result["photos"]), len(result["rejected"])) == (37, 0)
     found = [each for each in result["points"] if each["id"] in tied.xyz]
     assert len(found) == len(tied.xyz)

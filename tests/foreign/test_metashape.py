@@ -14,10 +14,12 @@ from pyproj import Transformer
 import photostrip
 from photostrip.geometry.rotation import from_angles
 from photostrip.project.check import check_project
+from photostrip.result.table import rows_of
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
 from tests.foreign.metashape_models import SCALE, UTM, cameras, document, label_of, markers, simulated
 from tests.loops import nonempty
+from tests.results import rotation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +39,7 @@ def on_earth(truth: Document) -> tuple[Floats, Floats]:
         longitude, latitude = to_wgs84.transform(places[:, 0], places[:, 1])
         return np.column_stack(to_earth.transform(longitude, latitude, places[:, 2]))
 
-    ground = np.array([[photo[axis] for axis in "xyz"] for photo in truth["photos"]])
+    ground = np.array([[photo[axis] for axis in "xyz"] for photo in rows_of(truth["photos"])])
     axes = []
     for step in 10.0 * np.eye(3):
         along = geocentric(ground + step) - geocentric(ground - step)
@@ -104,9 +106,9 @@ def test_orientations_are_those_of_the_chunk_on_the_earth(tmp_path: Path, chunk:
     assert (given.frame.crs, given.observed) == ("geocentric", False)
     truth = simulated(tmp_path / "again", control=CONTROL)
     axes, places = on_earth(truth)
-    order = [given.photos.index(label_of(each["id"])) for each in truth["photos"]]
+    order = [given.photos.index(label_of(each["id"])) for each in rows_of(truth["photos"])]
     np.testing.assert_allclose(given.enu[order], places, atol=1e-4)
-    expected = axes @ np.array([each["rotation"] for each in truth["photos"]]).reshape(-1, 3, 3)
+    expected = axes @ np.array([rotation(each) for each in rows_of(truth["photos"])])
     np.testing.assert_allclose(from_angles(given.angles, given.system)[order], expected, atol=1e-6)
     with (tmp_path / "block" / "orientations.csv").open(encoding="utf-8") as file:
         sigma = {float(row[name]) for row in csv.DictReader(file) for name in ("sx", "sy", "sz")}

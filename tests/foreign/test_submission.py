@@ -14,6 +14,7 @@ from pyproj import CRS
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import read_result
 from tests.foreign.test_exports import (
     UTM,
     Ran,
@@ -46,7 +47,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ran]:
     for name in ("geographic", "geocentric"):
         asked = ("--set", f"output.crs={FRAMES[name]}")
         assert main(["run", str(folder / "project" / "project.yaml"), "-o", str(folder / name), "-q", *asked]) == 0
-        document = json.loads((folder / name / "result.json").read_text(encoding="utf-8"))
+        document = read_result(str(folder / name / "result.json"))
         found[name] = Ran(folder / name, document)
     return found
 
@@ -124,8 +125,8 @@ def test_what_historix_cannot_take_is_refused(
     assert "write NAME_extrinsics.csv" in refused(capsys, str(runs["map"]), f"{tmp_path}/a.csv", "--to", "historix")
     assert "longitude and latitude" in refused(capsys, str(ran(tmp_path / "local")), target)
     document = json.loads((runs["map"].folder / "result.json").read_text(encoding="utf-8"))
-    cameras = document["cameras"]
-    cameras.append({**cameras[0], "id": "other", "single_photos": [document["photos"][0]["id"]]})
+    for key, column in document["cameras"].items():
+        column.append({"id": "other", "single_photos": [document["photos"]["id"][0]]}.get(key, column[0]))
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     assert "takes one camera, and the photos have" in refused(capsys, str(tmp_path / "result.json"), target)
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Proj, Transformer
 
-from photostrip.errors import InputError
+from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from tests.geodesy.frames import frame, krueger, spec
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 MICROMETRE = 1e-6  # m
 NANORADIAN = 1e-9
 WGS84 = {"a": 6378137.0, "flattening": 1.0 / 298.257223563}
-US_FOOT = 1200.0 / 3937.0
 UTM33 = frame("EPSG:32633")
 
 # crs, west, east, south, north: where each of these is in use
@@ -137,15 +136,6 @@ def test_convergence_has_the_sign_of_the_textbooks() -> None:
 # ------------------------------------------------------------------------------- units, bodies, differences
 
 
-def test_feet_in_plan_and_metres_in_height() -> None:
-    grid = frame("EPSG:2263")  # 300 000 m are 984 250 feet at the origin 40 10' N, 74 W
-    assert (grid.plan_unit, grid.height_unit) == ("US survey foot", "metre")
-    xyz = cartesian(grid, np.array([-74.0, 40.0 + 10.0 / 60.0, 12.0]))
-    assert grid.ground_from_cartesian(xyz)[0] == pytest.approx((300000.0 / US_FOOT, 0.0, 12.0), abs=1e-5)
-    a, b = np.array([[984250.0, 100.0, 12.0]]), np.array([[984249.0, 97.0, 10.0]])
-    assert grid.difference(a, b)[0] == pytest.approx((US_FOOT, 3.0 * US_FOOT, 2.0))
-
-
 @given(
     lon=st.floats(-180.0, 180.0),
     lat=st.floats(-89.0, 89.0),
@@ -211,3 +201,16 @@ def test_longitudes_and_latitudes_that_do_not_exist(point: tuple[float, ...]) ->
         InputError, match=r"^row 0: no such longitude and latitude \(are the axes in the right order\?\)$"
     ):
         frame("EPSG:4979").cartesian_from_ground([point])
+
+
+def test_a_polar_grid_works_at_its_pole() -> None:
+    for crs, normal in (("EPSG:3031", -1.0), ("EPSG:5041", 1.0), ("EPSG:32661", 1.0)):
+        grid = FRAMES[crs]
+        xyz = cartesian(grid, np.array([0.0, normal * 90.0, 100.0]))
+        axes = grid.axes_at(xyz)[0]
+        assert axes[2] == pytest.approx((0.0, 0.0, normal), abs=NANORADIAN)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        enu = grid.ground_from_cartesian(xyz)
+        assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
+        with pytest.raises(GeometryError, match="row 0: at a pole there is no east and no north"):
+            grid.convergence(xyz)

@@ -154,3 +154,11 @@ def test_the_motion_of_points_is_that_of_the_derivatives_summed_point_by_point(s
     root = Spread.of(points).motion(similarity, center, unit)
     moved = similarity_derivatives(similarity(points), center) / ([1.0] * 3 + [unit] * 4)
     assert np.allclose(root @ root.T, np.einsum("nci,ncj->ij", moved, moved) / len(points), rtol=1e-6, atol=1e-6)
+
+
+def test_collinearity_of_too_few_points() -> None:
+    assert collinearity(np.zeros((0, 3))) == 0
+    assert collinearity([[0, 0, 0], [1, 0, 0]]) == 0
+    assert collinearity(np.ones((4, 3))) == 0
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert collinearity(square) == pytest.approx(1)

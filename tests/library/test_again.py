@@ -12,10 +12,12 @@ import pytest
 
 import photostrip
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.source import digest
 from photostrip.library.again import compare_again
 from photostrip.result.statement.certificate import result_hash
 from tests.loops import nonempty
+from tests.results import by_rows, in_tables
 from tests.source_tree import ROOT
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
@@ -41,13 +43,13 @@ def copied(made: Path, tmp_path: Path) -> Path:
 
 
 def document(folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((folder / "result" / "result.json").read_text(encoding="utf-8"))
+    found: dict[str, Any] = by_rows(read_result(str(folder / "result" / "result.json")))
     return found
 
 
 def edited(folder: Path, found: dict[str, Any]) -> Path:
     path = folder / "edited.json"
-    path.write_text(json.dumps(found), encoding="utf-8")
+    path.write_text(to_json(in_tables(found)), encoding="utf-8")
     return path
 
 
@@ -60,7 +62,7 @@ def test_a_certificate_has_the_hash_of_every_file_and_no_path(made: Path) -> Non
         for name in ("project.yaml", "observations.csv", "control.csv")
     }
     assert str(made) not in json.dumps(block)
-    assert block["result_sha256"] == result_hash(document(made))
+    assert block["result_sha256"] == result_hash(in_tables(document(made)))
 
 
 def test_the_bytes_do_not_depend_on_where_a_project_is_run_from(
@@ -140,7 +142,7 @@ def test_an_edited_result_is_told(copied: Path) -> None:
     saved["points"][0]["x"] += 0.5
     compared = compare_again(edited(copied, saved), project)
     assert (compared["status"], compared["again"]["edited"], len(compared["differences"])) == ("different", True, 1)
-    saved["certificate"]["result_sha256"] = result_hash(saved)  # edited by someone who knows of the hash
+    saved["certificate"]["result_sha256"] = result_hash(in_tables(saved))  # edited by someone who knows of the hash
     compared = compare_again(edited(copied, saved), project)
     assert (compared["status"], compared["again"]["edited"]) == ("different", False)
 

@@ -166,12 +166,7 @@ def test_an_image_of_control_that_a_real_pair_rejects_is_told() -> None:
     row = next(row for row in sample.images("651") if sample.observations["photo"][row] == "8937")
     assert sample.run("bundle")["verdict"]["look_at"] == []
     document = sample.run("bundle", [(row, "y")], size=0.07)
-    (size,) = (
-        each["vy_um"][place]
-        for each in document["residuals"]
-        if each["photo"] == "8937"
-        for place in (each["points"].index("651"),)
-    )
+    (size,) = document["residuals"].where(photo="8937", point="651")["vy_um"]
     assert size == pytest.approx(69.7, abs=0.1)
     assert not require_told(document, "651", "8937")
     assert document["verdict"]["look_at"] == [

@@ -42,7 +42,7 @@ def in_memory(simulation: photostrip.Simulation) -> tuple[dict[str, Any], dict[s
     project: dict[str, Any] = {
         "name": "memory",
         "cameras": {"film": {"principal_distance": np.float64(153.0), "format": np.array([230.0, 230.0])}},
-        "strips": [{"id": "A", "camera": "film", "photos": [each["id"] for each in simulation.truth["photos"]]}],
+        "strips": [{"id": "A", "camera": "film", "photos": simulation.truth["photos"]["id"]}],
         "observations": {"file": "images", "unit": "mm", "sigma": 0.005},
         "control": [
             {"file": "given", "crs": "EPSG:32633", "axes": ["east", "north", "up"], "sigma": [0.05, 0.05, 0.08]}

@@ -28,12 +28,15 @@ MEMBERS = {
     "Plan": ["document", "files", "report"],
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
-        "accuracy", "computed", "control", "covariance_of", "crs", "document", "files", "findings", "in_columns",
+        "accuracy", "computed", "control", "covariance_of", "crs", "document", "files", "findings",
         "name", "notes", "pairs", "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals",
         "statement", "status", "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],
-    "Table": ["columns", "meanings", "name", "to_arrow", "to_geopandas", "to_pandas", "units", "where"],
+    "Table": [
+        "columns", "in_frame", "joined", "meanings", "name", "of", "of_rows", "quantities", "to_arrow", "to_geopandas",
+        "to_pandas", "units", "values", "where", "with_columns",
+    ],
 }  # fmt: skip
 STEPS = [
     "absolute", "bundle", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection",
@@ -63,13 +66,14 @@ def test_the_parameters_of_a_function_are_these(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(MEMBERS))
 def test_the_members_of_a_class_are_these_and_explained(name: str) -> None:
     found = getattr(photostrip, name)
-    source = inspect.getsource(found)
-    public = [member for member in vars(found) if not member.startswith("_")]
+    parts = found.__mro__[:-1]
+    source = "".join(map(inspect.getsource, parts))
+    public = [member for part in parts for member in vars(part) if not member.startswith("_")]
     assert [
         member for member in nonempty(MEMBERS[name]) if member not in public and f"self.{member}" not in source
     ] == []
     assert [member for member in public if member not in MEMBERS[name]] == []
-    assert [member for member in public if not inspect.getdoc(vars(found)[member])] == []
+    assert [member for member in public if not inspect.getdoc(getattr(found, member))] == []
 
 
 def test_an_unknown_name_is_refused_as_python_does() -> None:

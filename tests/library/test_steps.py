@@ -15,6 +15,7 @@ from photostrip import steps
 from photostrip.camera import Camera, Distortion
 from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
+from photostrip.result.quantities import MATRIX
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -33,9 +34,9 @@ class Truth:
     def __init__(self) -> None:
         self.simulation = photostrip.simulate({}, flight={"photos": 3}, ground={"crs": "local"}, seed=3, **NOISE)
         truth = self.simulation.truth
-        self.points = {each["id"]: np.array([each[axis] for axis in "xyz"]) for each in truth["points"]}
-        self.centers = np.array([[each[axis] for axis in "xyz"] for each in truth["photos"]])
-        self.rotations = np.array([each["rotation"] for each in truth["photos"]]).reshape(-1, 3, 3)
+        places, self.centers = (np.column_stack([truth[of][axis] for axis in "xyz"]) for of in ("points", "photos"))
+        self.points = dict(zip(truth["points"]["id"], places, strict=True))
+        self.rotations = np.column_stack([truth["photos"][name] for name in MATRIX]).reshape(-1, 3, 3)
 
     def image(self, photo: int, ids: list[str]) -> NDArray[np.float64]:
         """Project points by the collinearity equations."""

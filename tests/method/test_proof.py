@@ -40,6 +40,7 @@ from photostrip.simulation import (
 from photostrip.strip import polynomial
 from tests.attitudes import angle_between
 from tests.loops import nonempty
+from tests.results import rotation
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -282,7 +283,7 @@ def test_rotation_rows_are_east_north_up_at_the_perspective_centre() -> None:
     east = np.column_stack([-np.sin(lon), np.cos(lon), 0 * lon])
     up = np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
     expected = np.stack([east, np.cross(up, east), up], axis=1) @ found.simulation.truth.rotations
-    written = np.array([photo["rotation"] for photo in photos]).reshape(-1, 3, 3)
+    written = np.array([rotation(photo) for photo in photos])
     np.testing.assert_allclose(written, expected, rtol=0, atol=2e-9)
     assert np.degrees(np.arccos(up[0] @ up[-1])) > 0.25  # so that the place where the axes stand matters
 
@@ -297,7 +298,7 @@ def test_rotations_refer_to_the_grid_of_a_projection() -> None:
     assert convergence > 2.5
     azimuth = np.radians(70.0 - convergence)
     sin, cos = np.sin(azimuth), np.cos(azimuth)
-    np.testing.assert_allclose(middle["rotation"], [sin, -cos, 0, cos, sin, 0, 0, 0, 1], rtol=0, atol=2e-9)
+    np.testing.assert_allclose(rotation(middle).ravel(), [sin, -cos, 0, cos, sin, 0, 0, 0, 1], rtol=0, atol=2e-9)
 
 
 # ------------------------------------------------------------------------------------------------ with errors

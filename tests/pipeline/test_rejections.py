@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.result_files import rejected_csv
+from photostrip.formats.output.result_files import csv_pieces
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
@@ -46,7 +46,7 @@ def flown() -> Simulation:
 def rejected(inputs: Inputs, adjustment: str = "auto") -> str:
     """Give rejected.csv."""
     settings = replace(settings_of(flown()), adjustment=adjustment)
-    return "".join(rejected_csv(document_of(triangulate(inputs, settings))))
+    return "".join(csv_pieces(document_of(triangulate(inputs, settings))["rejected"]))
 
 
 def rows(text: str) -> list[dict[str, str]]:

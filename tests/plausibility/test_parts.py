@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.plausibility import flight, flight_order
+from photostrip.plausibility import flight
 from photostrip.plausibility.ids import TiesOfStrips, odd_ties
 from photostrip.plausibility.slips import slip
-from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Flight, Spec, Terrain
-from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -91,34 +87,6 @@ def test_a_usual_flight_has_no_finding(seed: int) -> None:
     assert flown(centers) == []
 
 
-@pytest.mark.parametrize(("factor", "photos"), [(1.0, []), (1 / 1.5, [("1003",)]), (1.5, [("1003",)])])
-def test_a_photo_at_another_scale_is_named_by_the_images_alone(factor: float, photos: list[tuple[str]]) -> None:
-    done = simulate(Spec(flight=Flight(photos=6, attitude_sigma_deg=(1.0, 1.0, 1.0)), terrain=Terrain(relief=60.0)))
-    observations = done.observations
-    xy = observations.xy.copy()
-    xy[observations.photo == observations.photo_ids.index("1003")] *= factor
-    strip = inputs_of(done).strips[0]
-    found = list(flight_order.find_other_scale(replace(observations, xy=xy), strip.id, strip.photos))
-    assert [each.photos for each in found] == photos
-    scales = [each.evidence["scale_over_neighbours"] for each in found]
-    assert scales == pytest.approx([factor] * len(photos), rel=0.1)
-
-
-def test_what_does_not_go_with_its_neighbours_is_named() -> None:
-    high = straight()
-    high[4, 2] += 60.0
-    assert ("P205", ("4",)) in flown(high)
-    long_base = straight()
-    long_base[5:, 0] += 120.0
-    assert flown(long_base) == [("P206", ("4", "5"))]
-    turned = straight()
-    turned[3:, 1] += 80.0
-    assert ("P207", ("2", "3")) in flown(turned)
-    below = np.full(8, 150.0)
-    below[2] = -150.0
-    assert flown(straight(), below) == [("P204", ("2",))]
-
-
 # --------------------------------------------------------------------------------------------------------- angles
 
 
@@ -127,20 +95,6 @@ def attitudes(count: int = 6) -> tuple[Floats, Floats]:
     rng = np.random.default_rng(4)
     values = np.column_stack([rng.normal(0, np.radians(2), (count, 2)), rng.uniform(-3, 3, count)])
     return values, Rotation.from_euler("XYZ", values).as_matrix()
-
-
-@pytest.mark.parametrize(
-    ("factor", "word"),
-    [(200 / 180, "gons"), (180 / 200, "degrees"), (180 / np.pi, "degrees"), (np.pi / 180, "radians")],
-)
-def test_angles_in_another_unit(factor: float, word: str) -> None:
-    values, matrices = attitudes()
-    names = [f"{number}" for number in range(len(values))]
-    assert list(flight.find_wrong_angles(values, "omega-phi-kappa", matrices, names)) == []
-    (finding,) = flight.find_wrong_angles(values * factor, "omega-phi-kappa", matrices, names)
-    assert finding.code == "P601"
-    assert f"; as {word} they differ by 0.00" in finding.message
-    assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_yaw_pitch_roll_of_a_gimbal() -> None:

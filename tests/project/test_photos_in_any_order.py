@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.formats.output.result_json import read_result
 from photostrip.project.loading import load_project
 from tests.project.samples import FILES, OBSERVATIONS, PROJECT, Sample, sample
 from tests.results import spec, write_project
@@ -163,5 +164,5 @@ def test_a_folder_of_photos_runs(tmp_path: Path, capsys: pytest.CaptureFixture[s
     printed = " ".join(capsys.readouterr().out.split())
     assert "10 in 2 strips, 8 models" in printed
     assert "10 photos in no given order: 2 strips found among them, 1001-1005 (5 photos), 2001-2005" in printed
-    photos = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))["photos"]
+    photos = read_result(str(tmp_path / "out" / "result.json"))["photos"]
     assert [photo["strip"] for photo in photos] == ["1001-1005"] * 5 + ["2001-2005"] * 5

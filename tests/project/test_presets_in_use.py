@@ -16,6 +16,7 @@ import pytest
 
 from photostrip import simulation
 from photostrip.cli.main import main as photostrip
+from photostrip.formats.output.result_json import read_result
 from photostrip.formats.output.simulation import project_files
 from photostrip.simulation.simulation import simulate as simulated
 from tests.source_tree import ROOT
@@ -82,8 +83,8 @@ def outcome(preset: str, seed: int, *options: str) -> Outcome:
         if code:
             message = f"{preset}, seed {seed}: exit code {code}"
             raise RuntimeError(message)
-        result = json.loads((folder / "out/result.json").read_text(encoding="utf-8"))
-    wrong = {row["point"] for row in json.loads(files["truth.json"])["errors"]}
+        result = read_result(str(folder / "out/result.json"))
+    wrong = set(json.loads(files["truth.json"])["errors"]["point"])
     rejected = {row["point"] for row in result["rejected"] if not row.get("readmitted", False)}
     # a point that is wrong on two photos by the same amount is wrong without a contradiction
     check = [row["plan_um"] for row in result["control"] if row["role"] == "check" and row["id"] not in wrong]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import copy
 import os
 from dataclasses import replace
 from functools import cache
@@ -14,13 +13,12 @@ import pytest
 
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.report.html import to_html
-from photostrip.result.records import as_lists
 from photostrip.simulation import Flight, Models, Spec
 from photostrip.simulation.simulation import simulate
 from tests.browser import Browser, chromium, opened
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import case, solved, spec
+from tests.results import by_rows, case, in_tables, solved, spec
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -71,9 +69,10 @@ LINKS = """
 def document(kind: str) -> dict[str, Any]:
     """Give the result of a project of a kind."""
     if kind == "failed run":
-        found = copy.deepcopy(saved())
+        found = by_rows(saved())
         found["control"] = [row | {"id": f"{row['id']}.{n}"} for n in range(3) for row in found["control"]]
-        return found
+        shown: dict[str, Any] = in_tables(found)
+        return shown
     if kind == "strip":  # long enough for a table that is filtered
         run = solved(inputs_of(simulate(Spec(flight=Flight(photos=24)))))
     elif kind == "models":
@@ -82,7 +81,7 @@ def document(kind: str) -> dict[str, Any]:
         inputs = case("projected", 2).inputs
         alone = tuple(Strip(photo, each.camera, (photo,)) for each in inputs.strips for photo in each.photos)
         run = solved(replace(inputs, strips=alone), Settings(adjustment="bundle"))
-    return dict(as_lists(run.document))
+    return run.document
 
 
 @pytest.fixture(scope="module")

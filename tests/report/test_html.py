@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import re
 from functools import cache
@@ -12,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import to_json
+from photostrip.formats.output.result_json import checked, to_json
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words
 from photostrip.report.pictures.result import pictures_of
 from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.result.records import as_lists
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import case, spec, write_project
+from tests.results import by_rows, case, in_tables, spec, write_project
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -153,13 +151,13 @@ def test_letters_and_marks_stand_out(scheme: int) -> None:
 
 
 def test_ids_cannot_become_elements() -> None:
-    document = copy.deepcopy(dict(as_lists(case().document)))
+    document = by_rows(case().document)
     name = "<b>&\"'</script>"
     for block in ("points", "control"):
         for row in document[block]:
             row["id"] = name if row["id"] == "K01" else row["id"]
     document["name"] = "<i>strip</i>"
-    text = to_html(document)
+    text = to_html(in_tables(document))
     assert "<b>" not in text
     assert "<i>" not in text
     assert "&lt;i&gt;strip" in text
@@ -168,7 +166,7 @@ def test_ids_cannot_become_elements() -> None:
 
 def test_the_same_result_gives_the_same_page() -> None:
     document = case().document
-    assert to_html(document) == to_html(json.loads(to_json(document)))
+    assert to_html(document) == to_html(checked(json.loads(to_json(document)), "result.json"))
 
 
 # ----------------------------------------------------------------------------------------------------- commands
@@ -187,10 +185,10 @@ def test_run_and_report_write_the_same_page(tmp_path: Path, capsys: pytest.Captu
 
 @pytest.mark.slow
 def test_long_tables_are_whole() -> None:
-    document = copy.deepcopy(saved())
+    document = by_rows(saved())
     document["control"] = [row | {"id": f"{row['id']} {n}"} for n in range(9) for row in document["control"]]
     names = {f"{saved()['control'][0]['id']} {n}" for n in range(9)}
-    assert names <= set(Page(to_html(document)).words)
+    assert names <= set(Page(to_html(in_tables(document))).words)
 
 
 def test_the_menu_has_the_order_of_the_page() -> None:
@@ -201,7 +199,7 @@ def test_the_menu_has_the_order_of_the_page() -> None:
 
 
 def test_findings_lead_to_rows_and_pictures_and_back() -> None:
-    document = copy.deepcopy(saved())
+    document = by_rows(saved())
     point, pair = document["control"][0]["id"], document["models"][0]
     blank = {"code": "X", "title": "t", "severity": "warning", "accepted": False, "message": "m", "fix": "f"}
     where = {"evidence": {}, "strips": [], "file": "", "line": 0, "column": 0, "key": ""}
@@ -209,7 +207,7 @@ def test_findings_lead_to_rows_and_pictures_and_back() -> None:
         blank | where | {"points": [point], "photos": []},
         blank | where | {"points": [], "photos": [pair["left"]]},
     ]
-    text = to_html(document)
+    text = to_html(in_tables(document))
     for number, start in ((1, point), (2, f"{pair['left']} – ")):
         finding = re.search(rf'<li id="finding-{number}">(.*?)</li>', text, re.DOTALL)
         assert finding is not None
@@ -224,7 +222,7 @@ def test_findings_lead_to_rows_and_pictures_and_back() -> None:
 
 
 def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
-    document = copy.deepcopy(saved())
+    document = by_rows(saved())
     noted, odd = (row["id"] for row in document["control"][:2])
     document["control"][1]["stands_out"] = ["plan"]
     where = {"strip": "", "photos": [], "file": "", "line": 0, "column": 0, "key": ""}
@@ -232,7 +230,7 @@ def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
     document["notes"].append(note | {"message": f"control point {noted} is wrong"})
     look = [f"control point {noted} is wrong", f"control point {odd} (9 m in plan) stands out", "something else"]
     document["verdict"]["look_at"] = look
-    text = to_html(document)
+    text = to_html(in_tables(document))
     found = re.findall(r'<li id="finding-(\d)">(.*?)</li>', text, re.DOTALL)
     assert [number for number, _ in found] == ["1", "2"]
     for (number, item), name in nonempty(list(zip(found, (noted, odd), strict=True))):

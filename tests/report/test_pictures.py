@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import math
 import re
 from dataclasses import replace
@@ -15,20 +14,19 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import to_json
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel, chart, nice
 from photostrip.report.pictures.footprints import footprint_pictures, footprints
 from photostrip.report.pictures.places import plan_of, rays_of
 from photostrip.report.pictures.result import picture_files, pictures_of
-from photostrip.result.records import as_lists
+from photostrip.result.quantities import MATRIX
 from photostrip.simulation import Models
 from photostrip.simulation.flight import surface
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Ground, Image, Spec, Terrain
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import FRAMES, case, solved, spec
+from tests.results import FRAMES, by_rows, case, in_tables, rotation, solved, spec
 from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
@@ -46,7 +44,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def drawn(document: Document, name: str) -> str:
-    return next(picture.svg for picture in pictures_of(document) if picture.name == name)
+    return next(picture.svg for picture in pictures_of(in_tables(document)) if picture.name == name)
 
 
 def hints(svg: str) -> list[str]:
@@ -82,13 +80,17 @@ def test_residuals_stand_where_the_points_were_measured(frame: str) -> None:
     one = case(frame)
     rays = rays_of(one.document)
     places = plan_of(one.document).images(rays.photo, rays.point)
-    assert len(places) == sum(len(row["points"]) for row in one.document["residuals"])
+    assert len(places) == len(one.document["residuals"])
     measured = [one.measured[sight] for sight in zip(rays.photo, rays.point, strict=True)]
     assert np.abs(places - measured).max() < 0.5  # mm
 
 
 def test_points_have_their_differences_as_hints() -> None:
-    document = saved()
+    """Also the one of which only the height was given."""
+    document = by_rows(saved())
+    of_height = document["control"][0] | {"dx": None, "dy": None, "plan": None}
+    document["control"][0] = of_height
+    assert of_height["measured"]
     of_plan, along = hints(drawn(document, "plan")), hints(drawn(document, "deformation"))
     for row in nonempty([row for row in document["control"] if row["measured"] and row["height"] is not None]):
         name = f"{row['role']} point {row['id']}"
@@ -117,7 +119,7 @@ def test_vectors_are_drawn_to_the_scale_of_their_bar() -> None:
 
 
 def test_points_that_findings_name_have_a_ring_and_their_id() -> None:
-    document = copy.deepcopy(as_lists(case().document))
+    document = by_rows(case().document)
     bad = next(row["id"] for row in document["points"] if row["role"] == "new")
     document["findings"] = []
     assert "failed open" not in drawn(document, "plan")
@@ -133,21 +135,15 @@ def test_points_that_findings_name_have_a_ring_and_their_id() -> None:
 
 def test_parallaxes_have_the_mean_of_their_zone() -> None:
     document = case().document
-    sizes = [
-        size
-        for row in document["parallaxes"]
-        for size, used, zone in zip(row["q_um"], row["used"], row["zone"], strict=True)
-        if used and zone == 1
-    ]
+    sizes = document["parallaxes"].where(used=True, zone=1)["q_um"]
     assert f"zone 1, left centre: {np.mean(sizes):+.1f} ± " in drawn(document, "parallaxes")
 
 
 def test_ties_count_the_points_in_common() -> None:
     document = case(strips=2).document
-    on = {
-        row["photo"]: {point for point, used in zip(row["points"], row["used"], strict=True) if used}
-        for row in document["residuals"]
-    }
+    on: dict[str, set[str]] = {}
+    for row in document["residuals"].where(used=True):
+        on.setdefault(row["photo"], set()).add(row["point"])
     found = [re.fullmatch(r"(\w+) and (\w+): (\d+) points?", hint) for hint in hints(drawn(document, "ties"))]
     counts = {(tie[1], tie[2]): int(tie[3]) for tie in found if tie}
     names = sorted(on)
@@ -172,7 +168,7 @@ def test_every_picture_is_sound_and_stays_inside() -> None:
 
 
 def test_a_result_without_control_and_precision_has_pictures_of_the_rest() -> None:
-    document = json.loads(to_json(case().document))
+    document = by_rows(case().document)
     document.pop("precision", None)
     document["control"], document["misclosures"] = [], []
     for row in document["points"]:
@@ -180,13 +176,14 @@ def test_a_result_without_control_and_precision_has_pictures_of_the_rest() -> No
     names = {picture.name for picture in pictures_of(case().document)}
     left = {"precision", "precision-plan", "precision-height", "deformation", "check"}
     assert left < names
-    assert {picture.name for picture in pictures_of(document)} == names - left
+    assert {picture.name for picture in pictures_of(in_tables(document))} == names - left
 
 
 @cache
 def of_models(*, centers: bool) -> Document:
     inputs = inputs_of(simulate(replace(spec(strips=2), models=Models(centers=centers))))
-    return as_lists(solved(inputs, Settings(adjustment="polynomial")).document)
+    found: Document = by_rows(solved(inputs, Settings(adjustment="polynomial")).document)
+    return found
 
 
 def test_models_without_centres_have_a_plan_of_their_points() -> None:
@@ -247,12 +244,12 @@ def flown(terrain: Terrain, sigma_um: float = 5.0) -> tuple[Simulation, Document
         seed=1, ground=Ground("local"), flight=flight, terrain=terrain, control=Control(check=4), image=Image(sigma_um)
     )
     simulation = simulate(of_flight)
-    return simulation, as_lists(solved(inputs_of(simulation)).document)
+    return simulation, by_rows(solved(inputs_of(simulation)).document)
 
 
 def on_ground(document: Document) -> dict[str, NDArray[np.float64]]:
     """Return the footprints as east and north."""
-    plan = plan_of(document)
+    plan = plan_of(in_tables(document))
     first, (sine, cosine) = document["photos"][0], plan.north
     turn = np.array([[cosine, sine], [-sine, cosine]])
     return {photo: outline @ turn + (first["x"], first["y"]) for photo, outline in footprints(plan).items()}
@@ -262,8 +259,8 @@ def corners(simulation: Simulation) -> dict[str, NDArray[np.float64]]:
     """Return where the corners of the true photos meet the true ground, looked for along each ray."""
     heights, truth, places = surface(simulation.spec), simulation.truth, {}
     frame = 115.0 * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    for photo, centre, rotation in zip(truth.photo_ids, truth.centers, truth.rotations, strict=True):
-        rays = np.column_stack([frame, np.full(4, -DISTANCE)]) @ rotation.T
+    for photo, centre, turn in zip(truth.photo_ids, truth.centers, truth.rotations, strict=True):
+        rays = np.column_stack([frame, np.full(4, -DISTANCE)]) @ turn.T
         scale = np.linspace(0.3, 2.0, 4000)[:, None, None] * (centre[2] - heights.height) / DISTANCE
         along = centre + scale * rays
         below = along[..., 2] <= heights(along[..., 0], along[..., 1])
@@ -288,7 +285,7 @@ def turned(document: Document, number: int, degrees: float) -> Document:
     """Return a result one of whose photos looks up to the left by an angle."""
     made = copy.deepcopy(document)
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    made["photos"][number]["rotation"] = [1, 0, 0, 0, cosine, -sine, 0, sine, cosine]
+    made["photos"][number].update(zip(MATRIX, [1, 0, 0, 0, cosine, -sine, 0, sine, cosine], strict=True))
     return made
 
 
@@ -298,7 +295,7 @@ def test_oblique_photos_show_the_ground_before_the_horizon(tilt: float) -> None:
     made = turned(document, 2, tilt)
     photo = made["photos"][2]
     way = np.array([[*place, 300.0] for place in on_ground(made)[photo["id"]]]) - [photo[axis] for axis in "xyz"]
-    image = way @ np.array(photo["rotation"]).reshape(3, 3)
+    image = way @ rotation(photo)
     image = -DISTANCE * image[:, :2] / image[:, 2:]
     # the upper border, unless rays of it do not come down: then the line below the horizon
     limit = DISTANCE * (math.cos(math.radians(tilt)) - 0.1) / math.sin(math.radians(tilt)) if tilt else math.inf
@@ -324,10 +321,11 @@ def test_photos_that_show_no_ground_have_no_footprint() -> None:
 def test_few_points_tell_of_the_height(count: int) -> None:
     _, document = flown(Terrain(relief=60.0))
     made = copy.deepcopy(document)
-    row = made["residuals"][2]
-    made["points"] = [point for point in made["points"] if point["id"] in row["points"][:count]]
+    third = made["photos"][2]["id"]
+    kept = [row["point"] for row in made["residuals"] if row["photo"] == third][:count]
+    made["points"] = [point for point in made["points"] if point["id"] in kept]
     shown = on_ground(made)
-    assert row["photo"] in shown
+    assert third in shown
     for outline in nonempty(shown.values()):
         assert np.ptp(outline, axis=0) == pytest.approx((SIDE, SIDE), rel=0.1)  # hills of 60 m from 1530 m, tilts of 1°
 
@@ -338,8 +336,8 @@ def test_the_overlap_is_counted_within_the_outlines() -> None:
     made = copy.deepcopy(document)
     first = made["photos"][0]
     made["photos"], made["strips"] = [first, first | {"id": "again"}], made["strips"][:1]
-    made["residuals"].append(made["residuals"][0] | {"photo": "again"})
-    (picture,) = footprint_pictures(plan_of(made))
+    made["residuals"] += [row | {"photo": "again"} for row in made["residuals"] if row["photo"] == first["id"]]
+    (picture,) = footprint_pictures(plan_of(in_tables(made)))
     assert ">2 photos<" in picture.svg
     assert ">1 photo<" not in picture.svg
 

@@ -18,12 +18,13 @@ from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, rounded, significant
-from photostrip.result.records import Records
+from photostrip.result.quantities import MATRIX
 from photostrip.result.summary import TOLERANCES, counts_of
+from photostrip.result.table import Table, plain_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, GrossError
 from tests.loops import nonempty
-from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to
+from tests.results import FRAMES, NORTH_FIRST, Case, case, rotation, solved, spec, written_to
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def leaves(value: object) -> Iterator[object]:
     if isinstance(value, dict):
         for each in value.values():
             yield from leaves(each)
-    elif isinstance(value, list | tuple | Records):
+    elif isinstance(value, list | tuple | Table):
         for each in value:
             yield from leaves(each)
     else:
@@ -73,13 +74,14 @@ FIXED = {
     "status": str,
     "adjustment": str,
     "frame": {"crs": str, "axes": list},
-    "photos": [{"id": str, "strip": str, "x": float, "y": float, "z": float, "rotation": list, "angles": dict}],
+    "photos": [{"id": str, "strip": str, "x": float, "y": float, "z": float, "r11": float, "angle_1": float}],
+    "angles": {"system": str, "unit": str},
     "points": [{"id": str, "role": str, "x": float, "y": float, "z": float, "rays": int}],
     "models": [
         {
             "left": str,
             "right": str,
-            "elements": dict,
+            "elements_kappa1": float,
             "sigma0_um": float,
             "max_parallax_um": float,
             "points_used": int,
@@ -93,7 +95,8 @@ FIXED = {
         "check_rms": {"x": float, "y": float, "z": float},
         "photo_scale": float,
     },
-    "polynomials": [{"degree": int, "terms": dict, "coefficients": dict, "sigmas": dict, "evidence": list}],
+    "polynomials": [{"degree": int}],
+    "polynomial_evidence": [{"strip": str, "group": str, "degree": int}],
 }
 
 
@@ -104,7 +107,7 @@ def check_shape(value: object, shape: object, path: str) -> None:
             assert key in value, f"{path}.{key}"
             check_shape(value[key], each, f"{path}.{key}")
     elif isinstance(shape, list):
-        assert isinstance(value, list | Records), path
+        assert isinstance(value, Table), path
         assert value, path
         for each in value:
             check_shape(each, shape[0], path)
@@ -116,11 +119,11 @@ def check_shape(value: object, shape: object, path: str) -> None:
 def test_the_fixed_keys_are_there(frame: str) -> None:
     document = case(frame).document
     check_shape(document, FIXED, "result")
-    assert document["photostrip_result"] == 1
+    assert document["photostrip_result"] == 2
     assert document["frame"]["crs"] == FRAMES[frame].crs
     assert document["frame"]["axes"] == list(FRAMES[frame].axes)
     assert {row["role"] for row in document["points"]} == {"new", "control", "check"}
-    assert all(len(photo["rotation"]) == 9 for photo in nonempty(document["photos"]))
+    assert set(MATRIX) <= set(document["photos"].columns)
 
 
 def test_a_rejection_has_its_fixed_keys() -> None:
@@ -137,7 +140,7 @@ def test_numbers_are_finite_and_never_minus_zero(frame: str) -> None:
         if isinstance(leaf, float):
             assert math.isfinite(leaf)
             assert leaf != 0 or math.copysign(1, leaf) > 0
-    json.dumps(document, allow_nan=False, default=list)
+    json.dumps(plain_of(document), allow_nan=False)
 
 
 # --------------------------------------------------------------------- photos and points belong together, anywhere
@@ -181,16 +184,15 @@ def worst_reprojection(found: Case) -> float:
     place = dict(zip(names, geocentric(document, np.array([ground[name] for name in names])), strict=True))
     measured, worst, rays = found.measured, 0.0, 0
     photos = {photo["id"]: photo for photo in document["photos"]}
-    for group in nonempty(document["residuals"]):
-        photo = photos[group["photo"]]
+    for name, photo in photos.items():
         center = geocentric(document, in_order(document, xyz(photo))[None])[0]
-        rotation = np.array(photo["rotation"]).reshape(3, 3).T @ axes_at(document, center)
-        for point, vx, vy in zip(group["points"], group["vx_um"], group["vy_um"], strict=True):
-            x, y, z = rotation @ (place[point] - center)
+        turn = rotation(photo).T @ axes_at(document, center)
+        for ray in document["residuals"].where(photo=name):
+            x, y, z = turn @ (place[ray["point"]] - center)
             assert z < 0, "the camera looks along -z"
             projected = -focal * np.array([x, y]) / z
-            residual = (measured[group["photo"], point] - projected) * 1000
-            worst = max(worst, float(np.abs(residual - [vx, vy]).max()))
+            residual = (measured[name, ray["point"]] - projected) * 1000
+            worst = max(worst, float(np.abs(residual - [ray["vx_um"], ray["vy_um"]]).max()))
             rays += 1
     assert rays > 50
     return worst
@@ -226,11 +228,11 @@ def test_axes_turn_over_what_is_written_and_nothing_else() -> None:
             assert xyz(a) == [b["y"], b["x"], b["z"]]
     for a, b in nonempty(zip(east["control"], north["control"], strict=True)):
         assert (a["dx"], a["dy"], a["dz"]) == (b["dy"], b["dx"], b["dz"])
-        assert a["sigma"] == [b["sigma"][1], b["sigma"][0], b["sigma"][2]]
+        assert [a[f"sigma_{k}"] for k in (1, 2, 3)] == [b[f"sigma_{k}"] for k in (2, 1, 3)]
     for key in ("control_rms", "check_rms"):
         a, b = east["summary"][key], north["summary"][key]
         assert (a["x"], a["y"], a["z"]) == (b["y"], b["x"], b["z"])
-    assert [photo["rotation"] for photo in east["photos"]] == [photo["rotation"] for photo in north["photos"]]
+    assert all((east["photos"][name] == north["photos"][name]).all() for name in MATRIX)
     assert east["summary"]["check"] == north["summary"]["check"]
 
 
@@ -243,11 +245,10 @@ def test_angles_are_those_of_the_rotation(system: str, moved: Literal["YXZ", "XY
     document = solved(case("local").inputs, Settings(angle_system=system, angle_unit=unit)).document
     per_radian = {"deg": 180 / math.pi, "gon": 200 / math.pi, "rad": 1.0}[unit]
     for photo in nonempty(document["photos"]):
-        expected = Rotation.from_matrix(np.array(photo["rotation"]).reshape(3, 3)).as_euler(moved)
+        expected = Rotation.from_matrix(rotation(photo)).as_euler(moved)
         expected[0] *= sign
-        assert photo["angles"]["system"] == system
-        assert photo["angles"]["unit"] == unit
-        assert photo["angles"]["values"] == pytest.approx(expected * per_radian, abs=1e-6)
+        assert [photo[f"angle_{k}"] for k in (1, 2, 3)] == pytest.approx(expected * per_radian, abs=1e-6)
+    assert document["angles"] == {"system": system, "unit": unit}
 
 
 # ------------------------------------------------------------------------------------------------- given points
@@ -363,11 +364,11 @@ def test_micrometres_at_photo_scale() -> None:
 
 def test_the_ratio_counts_the_point_and_the_model() -> None:
     document = case("local").document
-    precision = document["strips"][0]["precision"]
+    strip = document["strips"][0]
     for row in nonempty(document["control"]):
-        point = (precision["plan"], precision["plan"], precision["height"])
-        expected = [math.hypot(a, b) for a, b in zip(row["sigma"], point, strict=True)]
-        assert row["sigma_fit"] == pytest.approx(expected, abs=2 * GROUND_STEP)
+        point = (strip["precision_plan"], strip["precision_plan"], strip["precision_height"])
+        expected = [math.hypot(row[f"sigma_{k}"], size) for k, size in enumerate(point, 1)]
+        assert [row[f"sigma_fit_{k}"] for k in (1, 2, 3)] == pytest.approx(expected, abs=2 * GROUND_STEP)
         found = max(abs(row[k]) / s for k, s in zip(("dx", "dy", "dz"), expected, strict=True))
         assert row["normalised"] == pytest.approx(found, abs=0.02)
 
@@ -377,11 +378,9 @@ def test_the_ratio_counts_the_point_and_the_model() -> None:
 
 def test_sigma0_follows_from_the_parallaxes() -> None:
     document = case("projected", 2).document
-    squares = sum(
-        q**2 for pair in document["parallaxes"] for q, used in zip(pair["q_um"], pair["used"], strict=True) if used
-    )
-    points = sum(sum(pair["used"]) for pair in document["parallaxes"])
-    redundancy = points - 5 * len(document["parallaxes"])
+    used = document["parallaxes"].where(used=True)
+    squares = float((used["q_um"] ** 2).sum())
+    redundancy = len(used) - 5 * len(document["models"])
     assert document["summary"]["redundancy"] == redundancy
     assert document["summary"]["sigma0_um"] == pytest.approx(math.sqrt(squares / 2 / redundancy), abs=0.02)
     assert document["summary"]["sigma0_um"] == pytest.approx(5.0, rel=0.35)
@@ -389,15 +388,15 @@ def test_sigma0_follows_from_the_parallaxes() -> None:
 
 def test_models_are_summed_up_from_their_parallaxes() -> None:
     document = case("projected", 2).document
-    for model, pair in nonempty(zip(document["models"], document["parallaxes"], strict=True)):
-        assert (model["left"], model["right"], model["strip"]) == (pair["left"], pair["right"], pair["strip"])
-        used = {p: q for p, q, yes in zip(pair["points"], pair["q_um"], pair["used"], strict=True) if yes}
+    for model in nonempty(document["models"]):
+        pair = document["parallaxes"].where(strip=model["strip"], left=model["left"], right=model["right"])
+        used = {row["point"]: row["q_um"] for row in pair if row["used"]}
         assert model["points_used"] == len(used)
-        assert model["points_rejected"] == len(pair["points"]) - len(used)
+        assert model["points_rejected"] == len(pair) - len(used)
         assert model["max_parallax_um"] == max(map(abs, used.values()))
         assert abs(used[model["max_parallax_point"]]) == model["max_parallax_um"]
         assert model["rms_parallax_um"] == pytest.approx(math.sqrt(np.mean(np.square(list(used.values())))), abs=0.02)
-        assert model["elements"]["unit"] == "deg"
+    assert document["models"].units["elements_kappa1"] == "deg"
 
 
 def test_bases_are_the_distances_of_the_photos() -> None:
@@ -420,20 +419,20 @@ def test_models_without_errors_agree() -> None:
     document = case("local", 1, 0.0).document
     for joint in nonempty(document["junctions"]):
         assert joint["spread_ppm"] < 0.1
-        assert max(joint["discrepancy"].values()) < GROUND_STEP
+        assert max(joint[f"discrepancy_{name}"] for name in ("along", "across", "up")) < GROUND_STEP
     assert document["summary"]["image_rms_um"] < 0.01
 
 
 def test_models_with_errors_disagree_most_in_height() -> None:
     """A height comes from a parallax over the base: it is worse than plan by depth over base and the root of two."""
     joints = case("projected", 2).document["junctions"]
-    up = math.sqrt(np.mean([joint["discrepancy"]["up"] ** 2 for joint in joints]))
-    along = math.sqrt(np.mean([joint["discrepancy"]["along"] ** 2 for joint in joints]))
+    up = math.sqrt(np.mean([joint["discrepancy_up"] ** 2 for joint in joints]))
+    along = math.sqrt(np.mean([joint["discrepancy_along"] ** 2 for joint in joints]))
     assert 0.05 < up < 0.6
     assert along < up / 3
     for joint in nonempty(joints):
         scale = next(s["photo_scale"] for s in case("projected", 2).document["strips"] if s["id"] == joint["strip"])
-        assert joint["discrepancy_um"]["up"] == pytest.approx(joint["discrepancy"]["up"] / scale * 1e6, abs=0.1)
+        assert joint["discrepancy_um_up"] == pytest.approx(joint["discrepancy_up"] / scale * 1e6, abs=0.1)
 
 
 def test_a_gross_error_is_rejected_and_its_size_stands_in_the_residuals() -> None:
@@ -447,10 +446,9 @@ def test_a_gross_error_is_rejected_and_its_size_stands_in_the_residuals() -> Non
         assert (row["stage"], row["test"], row["unit"]) == ("relative", "parallax", "um")
         assert row["value"] > row["limit"]
     unused = [
-        (group["photo"], vy)
-        for group in document["residuals"]
-        for name, vy, used in zip(group["points"], group["vy_um"], group["used"], strict=True)
-        if name == point and not used and vy is not None
+        (ray["photo"], ray["vy_um"])
+        for ray in document["residuals"].where(point=point, used=False)
+        if ray["vy_um"] is not None
     ]
     shown = {row["photo"] for row in big} | {row["other_photo"] for row in big}
     assert all(photo in shown and abs(vy) == pytest.approx(300, abs=60) for photo, vy in nonempty(unused))
@@ -496,42 +494,47 @@ def test_ties_are_the_differences_of_strips_computed_alone() -> None:
 def test_the_polynomial_moves_the_control_by_the_stated_misclosures() -> None:
     """Misclosure plus polynomial at a control point is what is left there: plan along the strip's own axes."""
     document = solved(case("local").inputs, Settings(adjustment="polynomial")).document
-    (block,), (absolute,) = document["polynomials"], document["absolute"]
-    axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
+    (absolute,) = document["absolute"]
+    axes, origin = frame_of(absolute)
     points = {row["id"]: np.array(xyz(row)) for row in document["points"]}
     left = {row["id"]: np.array([row["dx"], row["dy"], row["dz"]]) for row in document["control"]}
     for row in nonempty(document["misclosures"]):
         before = np.array([row["east"], row["north"], row["up"]])
         place = axes.T @ (points[row["id"]] - (left[row["id"]] - before) - origin)
-        correction = [polynomial(block, axis, place[0], place[1]) for axis in "xyz"]
+        correction = [polynomial(document, axis, place[0], place[1]) for axis in "xyz"]
         assert axes @ correction == pytest.approx(left[row["id"]] - before, abs=5 * GROUND_STEP)
 
 
-def polynomial(block: Document, axis: str, x: float, y: float) -> float:
+def frame_of(absolute: Document) -> tuple[Floats, Floats]:
+    """Give axes and origin of the intermediate frame."""
+    axes = np.array([absolute[name.replace("r", "a")] for name in MATRIX]).reshape(3, 3)
+    return axes, np.array([absolute[f"origin_{axis}"] for axis in "xyz"])
+
+
+def polynomial(document: Document, axis: str, x: float, y: float) -> float:
     powers = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
-    terms = zip(block["terms"][axis], block["coefficients"][axis], strict=True)
-    return float(sum(c * x ** powers[term][0] * y ** powers[term][1] for term, c in terms))
+    terms = [(row["coefficient"], *powers[row["term"]]) for row in document["polynomial_terms"].where(axis=axis)]
+    return float(sum(c * x**a * y**b for c, a, b in terms))
 
 
 def test_the_drift_found_is_the_slope_of_the_polynomial() -> None:
     inputs = case("local").inputs
     document = solved(inputs, Settings("polynomial", polynomial=replace(Settings().polynomial, degree="2"))).document
-    (block,), (absolute,), (strip,) = document["polynomials"], document["absolute"], document["strips"]
-    axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
+    (absolute,), (strip,) = document["absolute"], document["strips"]
+    axes, origin = frame_of(absolute)
     start, end = (axes.T @ (np.array(xyz(document["photos"][n])) - origin) for n in (0, -1))
-    slope = dict(zip(block["terms"]["x"], block["coefficients"]["x"], strict=True))
+    terms = document["polynomial_terms"].where(axis="x")
+    slope = dict(zip(terms["term"], terms["coefficient"], strict=True))
     assert "X^2" in slope
-    assert strip["scale_drift"]["found_ppm"] == pytest.approx(2e6 * slope["X^2"] * (end[0] - start[0]), abs=0.2)
-    assert block["t"]["x"] == pytest.approx(
-        [c / s for c, s in zip(block["coefficients"]["x"], block["sigmas"]["x"], strict=True)], rel=1e-2, abs=0.01
-    )
+    assert strip["scale_drift_found_ppm"] == pytest.approx(2e6 * slope["X^2"] * (end[0] - start[0]), abs=0.2)
+    assert terms["t"] == pytest.approx(terms["coefficient"] / terms["sigma"], rel=1e-2, abs=0.01)
 
 
 def test_without_a_polynomial_there_is_no_block() -> None:
     document = solved(case("local").inputs, Settings(adjustment="similarity")).document
     assert document["adjustment"] == "similarity"
     assert "polynomials" not in document
-    assert document["strips"][0]["scale_drift"]["found_ppm"] is None
+    assert document["strips"][0]["scale_drift_found_ppm"] is None
 
 
 def test_one_polynomial_for_each_strip() -> None:
@@ -547,14 +550,15 @@ def test_photos_stand_in_flight_order_and_points_in_natural_order() -> None:
     found = case("projected", 2)
     flown = [photo for strip in found.inputs.strips for photo in strip.photos]
     assert [photo["id"] for photo in found.document["photos"]] == flown
-    assert [group["photo"] for group in found.document["residuals"]] == flown
+    residuals, parallaxes = found.document["residuals"], found.document["parallaxes"]
+    assert list(dict.fromkeys(residuals["photo"])) == flown
     for names in (
-        [row["id"] for row in found.document["points"]],
-        [row["id"] for row in found.document["control"]],
-        *(group["points"] for group in found.document["residuals"]),
-        *(pair["points"] for pair in found.document["parallaxes"]),
+        found.document["points"]["id"],
+        found.document["control"]["id"],
+        *(residuals.where(photo=photo)["point"] for photo in flown),
+        *(parallaxes.where(left=photo)["point"] for photo in flown),
     ):
-        assert names == sorted(names, key=natural)
+        assert list(names) == sorted(names, key=natural)
 
 
 def test_natural_order() -> None:
@@ -594,9 +598,8 @@ def test_points_without_coordinates_are_named_with_the_reason() -> None:
     document = solved(replace(inputs, observations=once)).document
     assert {"id": "lonely", "reason": "measured on one photo only"} in document["not_determined"]
     assert "lonely" not in {row["id"] for row in document["points"]}
-    group = document["residuals"][0]
-    place = group["points"].index("lonely")
-    assert (group["vx_um"][place], group["vy_um"][place], group["used"][place]) == (None, None, False)
+    (ray,) = document["residuals"].where(point="lonely")
+    assert (ray["vx_um"], ray["vy_um"], ray["used"]) == (None, None, False)
 
 
 def test_notes_of_the_reading_come_first() -> None:
@@ -768,10 +771,9 @@ def test_a_wrong_ray_among_many_is_named() -> None:
     assert (found["photo"], found["point"]) == (photo, point)
     assert found["value"] > found["limit"]
     assert "meet without it" in found["reason"]
-    group = next(group for group in document["residuals"] if group["photo"] == photo)
-    place = group["points"].index(point)
-    assert group["used"][place] is False
-    assert group["vx_um"][place] == pytest.approx(300, rel=0.1)
+    (ray,) = document["residuals"].where(photo=photo, point=point)
+    assert ray["used"] is False
+    assert ray["vx_um"] == pytest.approx(300, rel=0.1)
     assert document["counts"]["rejected_for_rays"] == 1
 
 

@@ -1,91 +1,74 @@
-"""What is read again: looked at together and one by one, the same is refused."""
+"""What is read again: every value of its kind, every table with its columns of one length."""
 
 from __future__ import annotations
 
 import json
-import pickle
-import re
-from copy import deepcopy
-from random import Random
 
 import pytest
 
 from photostrip.errors import InputError
 from photostrip.result.description import described
-from photostrip.result.reading import _blocks_right, _wrong, located
-from tests.edited_results import edited
-from tests.reports import saved
+from photostrip.result.reading import read
 
-EDITS = 120
-MANY_DIGITS = "9" * 5000  # are refused when the file is read
 DEEP = "[" * 60 + "]" * 60
 
 
-def looks_right(text: str) -> bool:
-    """Whether a document is right, looked at together; one by one it has to be the same."""
-    document = json.loads(text)
-    found = _blocks_right([document], described())
-    assert found == (next(_wrong(document, described(), ""), None) is None), text[:200]
-    return found
-
-
-def test_columns_of_edited_results_are_right_where_their_values_are() -> None:
-    texts = [edited(saved(), Random(number)).text for number in range(EDITS)]
-    found = [looks_right(text) for text in texts if text.startswith("{") and MANY_DIGITS not in text]
-    assert 0.1 * EDITS < sum(found) < 0.9 * len(found)
+def refused(text: str) -> list[str]:
+    """Give the keys for which a part of a result is refused."""
+    try:
+        read(json.loads(text), "result.json", lacking=described().keys())
+    except InputError as error:
+        return [fault.key for fault in error.faults]
+    return []
 
 
 @pytest.mark.parametrize(
-    ("text", "right"),
+    ("columns", "wrong"),
     [
-        ('{"points": [{"id": "a", "x": 1.0}, {"id": "b", "x": null}, {"x": 2, "id": "c"}, {}]}', True),
-        ('{"points": [{"x": 1.0}, null]}', False),
-        ('{"points": [{"x": 1.0}, [{"x": 1.0}]]}', False),
-        ('{"points": [{"x": 1e200}, {"x": -1e200}]}', False),
-        ('{"points": [{"x": 9e99}, {"x": 9e99}]}', True),
-        ('{"points": [{"x": NaN}, {"x": 1.0}]}', False),
-        ('{"points": [{"rays": 3}, {"rays": 0.0}]}', False),
-        ('{"points": [{"rays": 0.0}, {"rays": 0.0}]}', False),
-        ('{"points": [{"rays": 999999999999999}, {"rays": 999999999999999}]}', True),
-        ('{"points": [{"rays": true}]}', False),
-        ('{"points": [{"id": "\\ud83d\\ude00"}, {"id": "\\ud83d"}]}', False),
-        ('{"points": [{"id": "\\ud83d\\ude00"}, {"id": ""}]}', True),
-        ('{"points": [{"id": []}, {"id": null}]}', False),
-        ('{"control": [{"measured": true}, {"measured": null}]}', True),
-        ('{"control": [{"measured": true}, {"measured": 1}]}', False),
-        ('{"control": [{"measured": true, "dx": 1.0}, {"dx": 1.0, "measured": true}]}', True),
-        ('{"control": [{"measured": true, "dx": 1.0}, {"dx": true, "measured": 1.0}]}', False),
-        ('{"control": [{"dx": 1.0, "dy": 1.0}, {"dx": 1.0}, {"dy": true}]}', False),
-        ('{"control": [{"dx": 1.0}, {"dx": false}]}', False),
-        ('{"points": [{"x": -Infinity}, {"x": NaN}, {"x": null}]}', False),
-        ('{"points": [{"rays": 1000000000000001}, {"rays": 1}]}', False),
-        ('{"points": [{}, {}]}', True),
-        ('{"points": [[], [{"x": 1.0}]]}', False),
-        ('{"photos": [{"rotation": []}, {"rotation": []}]}', True),
-        ('{"photos": [{"rotation": []}, {"rotation": 1.0}]}', False),
-        ('{"photos": [{"rotation": [1.0, null]}, {"rotation": []}]}', True),
-        ('{"photos": [{"rotation": [[1.0], [2.0]]}]}', True),
-        ('{"photos": [{"rotation": [[1.0], ["2"]]}]}', False),
-        ('{"photos": [{"new": [1, 2.5, true, "a", {"b": [null]}]}]}', True),
-        ('{"photos": [{"new": ["a", {"b": [Infinity]}]}]}', False),
-        ('{"photos": [{"new": "a", "\\udc00": 1}]}', False),
-        (f'{{"photos": [{{"new": {DEEP}}}]}}', False),
+        ('"id": ["lonely", "b"], "reason": ["c", null]', ""),
+        ('"id": ["a", "b"], "reason": ["c"]', "reason"),
+        ('"id": ["a"]', "reason"),
+        ('"id": "a", "reason": []', "-"),
+        ('"id": ["a", 7], "reason": ["c", "d"]', "id[1]"),
+        ('"id": [["a"]], "reason": ["c"]', "id[0]"),
+        ('"id": ["\\ud83d\\ude00"], "reason": ["\\ud83d"]', "reason[0]"),
+        ('"id": ["a"], "reason": ["c"], "new": [[1, 2.5, true, "a", {"b": [null]}]]', ""),
+        ('"id": ["a"], "reason": ["c"], "new": [["a", {"b": [Infinity]}]]', "new[0][1].b[0]"),
+        ('"id": ["a"], "reason": ["c"], "\\udc00": [1]', "-"),
+        (f'"id": ["a"], "reason": ["c"], "new": [{DEEP}]', "new[0]" + "[0]" * 51),
     ],
 )
-def test_columns_are_right_where_their_values_are(text: str, right: bool) -> None:
-    assert looks_right(text) is right
+def test_columns_are_there_and_of_one_length(columns: str, wrong: str) -> None:
+    found = refused(f'{{"not_determined": {{{columns}}}}}')
+    assert found == ([f"not_determined.{wrong}".removesuffix(".-")] if wrong else [])
 
 
-def test_a_key_that_is_missing_is_told_after_a_copy_too() -> None:
-    document = located(
-        lambda block: json.loads('{"summary": {"check": {}}, "points": [{"x": 1.0}]}', object_hook=block), "one.json"
+@pytest.mark.parametrize(
+    ("column", "values", "right"),
+    [
+        ("value", "[9e99, 9e99, null, 3]", True),
+        ("value", "[1e200]", False),
+        ("value", "[1.0, NaN]", False),
+        ("value", "[-Infinity, null]", False),
+        ("passed", "[true, null]", True),
+        ("passed", "[true, 1]", False),
+        ("name", "[1.0]", False),
+    ],
+)
+def test_values_are_of_their_kind(column: str, values: str, right: bool) -> None:
+    columns = dict.fromkeys(
+        ("name", "value", "limit", "unit", "passed"), "[" + ", ".join(["null"] * len(json.loads(values))) + "]"
     )
-    other = located(lambda block: json.loads('{"check": {}}', object_hook=block), "other.json")
-    for found in (document, deepcopy(document), pickle.loads(pickle.dumps(document))):  # noqa: S301 (our own)
-        assert found == document
-        for block, path in ((found["summary"]["check"], "summary.check.rms"), (found["points"][0], "points[0].rms")):
-            with pytest.raises(InputError, match=rf"one\.json: key '{re.escape(path)}' is missing"):
-                block["rms"]
-    with pytest.raises(InputError, match=r"other\.json: key 'check\.rms'"):  # each document has blocks of its own
-        other["check"]["rms"]
-    assert type(deepcopy(document["points"])[0]) is dict
+    text = ", ".join(f'"{key}": {each}' for key, each in (columns | {column: values}).items())
+    assert (refused(f'{{"tolerances": {{{text}}}}}') == []) is right
+
+
+@pytest.mark.parametrize(("count", "right"), [("999999999999999", True), ("1000000000000001", False), ("2.0", False)])
+def test_counts_are_whole_numbers(count: str, right: bool) -> None:
+    assert ("counts.photos" not in refused(f'{{"counts": {{"photos": {count}}}}}')) is right
+
+
+def test_a_whole_result_has_every_block() -> None:
+    with pytest.raises(InputError) as caught:
+        read({"name": "a"}, "result.json")
+    assert {"version", "status", "verdict"} <= {fault.key for fault in caught.value.faults}

@@ -18,7 +18,7 @@ from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
-from tests.results import Document, case, solved, spec
+from tests.results import Document, case, in_tables, solved, spec
 from tests.simulated import inputs_of, settings_of
 
 
@@ -198,9 +198,13 @@ def test_a_wrong_point_is_told_once_with_what_became_of_it() -> None:
     notes = [a_warning("control-rejected", ["G02"]), a_warning("control-rejected", ["G03"]), a_warning("weak", ["G02"])]
     changed = {**document, "control": control, "notes": notes, "findings": [a_finding("warning", ["G02"])]}
     expected = ["P406 off by a digit; not used", "control-rejected of G03", "weak of G02"]
-    assert verdict_of(changed)["look_at"] == expected
+    assert verdict_of(in_tables(changed))["look_at"] == expected
     changed["findings"] = [a_finding("warning", ["G02"]) | {"accepted": True}]
-    assert verdict_of(changed)["look_at"] == ["control-rejected of G02", "control-rejected of G03", "weak of G02"]
+    assert verdict_of(in_tables(changed))["look_at"] == [
+        "control-rejected of G02",
+        "control-rejected of G03",
+        "weak of G02",
+    ]
 
 
 def test_what_follows_from_data_that_contradict_themselves_is_not_said() -> None:
@@ -288,7 +292,7 @@ def with_pairs(sigma0: list[float], project: float, *, calibration: bool = False
     pairs = [{**document["models"][0], "sigma0_um": each, "redundancy": 10} for each in sigma0]
     bundle = {"bundle": {"calibration": [{"parameter": "f"}]}} if calibration else {}
     summary = {**document["summary"], "sigma0_um": project, "sigma_given_um": 5.0}
-    found: list[str] = verdict_of({**document, **bundle, "summary": summary, "models": pairs})["look_at"]
+    found: list[str] = verdict_of(in_tables({**document, **bundle, "summary": summary, "models": pairs}))["look_at"]
     return found
 
 
@@ -346,10 +350,12 @@ def test_photos_with_large_residuals_come_before_those_that_lost_points_worst_fi
     for name, rms in ((1, 4.0), (2, 9.0), (3, 5.0), (4, 6.0)):
         photos[name]["image_rms_um"] = rms
     lost = [
-        {"photo": str(name), "point": f"p{each}"} for name, count in ((5, 5), (6, 20), (7, 1)) for each in range(count)
+        {"photo": str(name), "point": f"p{each}", "readmitted": False}
+        for name, count in ((5, 5), (6, 20), (7, 1))
+        for each in range(count)
     ]
     summary = {**document["summary"], "image_rms_um": 1.0}
-    found = verdict_of({**document, "summary": summary, "photos": photos, "rejected": lost})["look_at"]
+    found = verdict_of(in_tables({**document, "summary": summary, "photos": photos, "rejected": lost}))["look_at"]
     told = [text.partition(":")[0] for text in found if "photo" in text]
     assert told == [
         "photo 2",

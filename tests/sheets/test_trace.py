@@ -118,7 +118,7 @@ def test_pairs_end_where_the_run_ended(name: str) -> None:
     for pair, model in nonempty(zip(pairs, models, strict=True)):
         end = pair["rounds"][-1]["end"]
         assert [end[e] for e in ELEMENTS] == pytest.approx([pair["elements"][e] for e in ELEMENTS], abs=1e-8)
-        assert [end[e] for e in ELEMENTS] == pytest.approx([model["elements"][e] for e in ELEMENTS], abs=2e-6)
+        assert [end[e] for e in ELEMENTS] == pytest.approx([model[f"elements_{e}"] for e in ELEMENTS], abs=2e-6)
         assert pair["rounds"][-1]["points"] == model["points_used"]
 
 
@@ -332,11 +332,11 @@ def test_a_pair_in_the_system_of_its_left_photo() -> None:
             assert own["bz"] == pytest.approx(-math.radians(e["alpha1"]), abs=small.sum() + 1e-8)
             turn = rotation(own["alpha"], own["omega"], own["kappa"]).as_matrix()
             assert turn == pytest.approx((left.inv() * right).as_matrix(), abs=1e-9)
-            model = models[pair["left"], pair["right"]]["photo_system"]
-            assert model["by_bx"] == pytest.approx(base[1] / base[0], abs=2e-8)
-            assert [model[name] for name in ("alpha", "omega", "kappa", "tau", "nu")] == pytest.approx(
-                [own[name] for name in ("alpha", "omega", "kappa", "tau", "nu")], abs=2e-6
-            )
+            model = models[pair["left"], pair["right"]]
+            assert model["photo_system_by_bx"] == pytest.approx(base[1] / base[0], abs=2e-8)
+            assert [
+                model[f"photo_system_{name}"] for name in ("alpha", "omega", "kappa", "tau", "nu")
+            ] == pytest.approx([own[name] for name in ("alpha", "omega", "kappa", "tau", "nu")], abs=2e-6)
 
 
 @pytest.mark.parametrize("name", ["projected", "geocentric"])

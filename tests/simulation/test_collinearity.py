@@ -105,20 +105,6 @@ def test_attitude_scatter_is_alpha_omega_kappa() -> None:
         assert np.abs(np.degrees(angle)).max() <= 3 * sigma + 1e-9
 
 
-def test_strips_flown_back_are_turned() -> None:
-    spec = replace(
-        FREE, ground=Ground(crs="local"), flight=Flight(strips=2, alternate=True, attitude_sigma_deg=(0.0, 0.0, 0.0))
-    )
-    done = simulate(spec)
-    expected = collinear(done, done.truth.ground.xyz, done.truth.centers_ground, done.truth.rotations_local)
-    assert np.abs(done.observations.xy - expected).max() < NANOMETRE
-    assert done.truth.rotations[0] == pytest.approx(np.eye(3), abs=1e-12)
-    assert done.truth.rotations[10] == pytest.approx(np.diag([-1.0, -1.0, 1.0]), abs=1e-12)
-    first, last = done.truth.centers[10], done.truth.centers[19]
-    assert last[0] < first[0]
-    assert first[1] > done.truth.centers[:10, 1].max()  # the next strip lies to the left of the first
-
-
 @pytest.mark.parametrize("crs", ["local", "EPSG:32633"])
 def test_refraction_moves_images_away_from_the_nadir(crs: str) -> None:
     spec = replace(

@@ -6,15 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pyproj import CRS, Transformer
 from scipy import stats
 
 from photostrip.points import locate
 from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec, simulate
 from photostrip.simulation.placement import band_photos
 from tests.loops import nonempty
-
-NONE = (0.0, 0.0, 0.0)
 
 
 def true_ground(done: Simulation, ids: tuple[str, ...]) -> np.ndarray:
@@ -73,23 +70,3 @@ def test_noise_is_normal_and_as_large_as_stated(crs: str) -> None:
     assert double.control.enu - done.control.enu == pytest.approx(
         done.control.enu - true_ground(done, done.control.ids), abs=1e-6
     )
-
-
-def test_two_zones_give_the_same_points() -> None:
-    spec = Spec(
-        ground=Ground(crs="EPSG:31468", axes=("north", "east", "up"), center_deg=(13.5, 48.0)),
-        flight=Flight(photos=20, heading_deg=85.0),
-        control=Control(every=3, noise=NONE, second_crs="EPSG:31469"),
-    )
-    done = simulate(spec)
-    west, east = done.control.frame == 0, done.control.frame == 1
-    assert west.sum() >= 6
-    assert east.sum() >= 6
-    assert [frame.crs for frame in done.frames] == ["EPSG:31468", "EPSG:31469"]
-    true = true_ground(done, done.control.ids)
-    assert done.control.enu[west] == pytest.approx(true[west], abs=1e-6)
-    zones = Transformer.from_crs(CRS("EPSG:31468"), CRS("EPSG:31469"), always_xy=True)
-    e, n = zones.transform(true[east, 0], true[east, 1])
-    assert done.control.enu[east] == pytest.approx(np.column_stack([e, n, true[east, 2]]), abs=1e-4)
-    longitude, _ = Transformer.from_crs("EPSG:31468", "EPSG:4314", always_xy=True).transform(true[:, 0], true[:, 1])
-    assert np.array_equal(np.array(longitude) >= 13.5, east)

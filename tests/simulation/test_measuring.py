@@ -56,3 +56,19 @@ def test_camera_positions(crs: str) -> None:
     error = done.gnss - done.truth.centers_ground
     assert error.std(axis=0) == pytest.approx([0.1, 0.2, 0.4], rel=4 / np.sqrt(2 * 200))
     assert simulate(LARGE).gnss is None
+
+
+def test_film_is_stretched_sheared_turned_and_shifted_as_stated() -> None:
+    film = Film(scale_ppm=200.0, shear_ppm=60.0, rotation_deg=2.0, offset_mm=4.0)
+    spec = Spec(flight=Flight(photos=400), image=Image(sigma_um=0.0), film=film)
+    marks = simulate(spec).fiducials
+    assert marks is not None
+    xy = {name: marks.xy[marks.point == k] for k, name in enumerate(marks.point_ids)}
+    across, upward = (xy["F8"] - xy["F6"]) / 220.0, (xy["F7"] - xy["F5"]) / 220.0
+    spread = pytest.approx(1.0, rel=4 / np.sqrt(2 * 400))
+    assert np.std(np.hypot(*across.T) - 1.0) / 200e-6 == spread
+    turn = np.arctan2(across[:, 1], across[:, 0])
+    assert np.degrees(turn).std() / 2.0 == spread
+    angle = np.arctan2(upward[:, 1], upward[:, 0]) - turn - np.pi / 2
+    assert angle.std() / 60e-6 == spread
+    assert ((xy["F8"] + xy["F6"]) / 2).std() / 4.0 == pytest.approx(1.0, rel=4 / np.sqrt(4 * 400))

@@ -76,23 +76,6 @@ def test_coordinates_directions_and_partials_of_the_vectors(vector: Vector) -> N
     np.testing.assert_allclose(by.by_f, [want["dlambda_df"], want["dbeta_df"]], rtol=rel)
 
 
-@given(azimuths, tilts, azimuths, distances, places)
-def test_the_general_form_is_equation_1(
-    alpha: float, omega: float, kappa: float, f: float, place: tuple[float, float]
-) -> None:
-    rotation = ground_from_photo(alpha, omega, kappa)
-    direction = directions_from_photo(place, f, rotation)
-    lam, beta = direction
-    if abs(beta) > np.radians(89.9):  # tan(beta) of the equation has no digits left
-        return
-    (a1, a2, a3), (b1, b2, b3), (c1, c2, c3) = attitude(alpha, omega, kappa)
-    below = a2 * np.sin(lam) + b2 * np.cos(lam) + c2 * np.tan(beta)
-    x = f * (a1 * np.sin(lam) + b1 * np.cos(lam) + c1 * np.tan(beta)) / below
-    z = f * (a3 * np.sin(lam) + b3 * np.cos(lam) + c3 * np.tan(beta)) / below
-    np.testing.assert_allclose([x, z], place, rtol=1e-9, atol=1e-8)
-    np.testing.assert_allclose(photo_from_directions(direction, f, rotation), place, rtol=1e-9, atol=1e-8)
-
-
 @given(distances, places, azimuths)
 def test_a_level_camera_follows_equations_2_and_3(f: float, place: tuple[float, float], alpha: float) -> None:
     x, z = place

@@ -80,16 +80,6 @@ def test_a_displacement_is_the_difference_of_two_points(
     np.testing.assert_allclose(displacements(first, second, f, base)[0], after - before, rtol=1e-9, atol=1e-9)
 
 
-def test_with_coordinates_of_the_first_epoch_the_formula_is_of_first_order_only() -> None:
-    """The second epoch in eq. 2 is not a matter of taste: 0.7 mm of 160 mm here."""
-    first, second = epochs(cases("pseudo_parallax")[0].values[0].input)
-    f, base = 1000.0, 50.0
-    exact = displacements(first, second, f, base)[0]
-    depth = base * f / (first[0, 0] - first[0, 2])
-    of_first_order = depth / f * (second - first)[0, 0] + exact[1] * first[0, 0] / f
-    assert abs(of_first_order - exact[0]) == pytest.approx(0.35 * 1.947 / 1000, rel=1e-3)
-
-
 def test_standard_errors_are_the_scatter_of_simulated_pseudo_parallaxes() -> None:
     first, second = np.array([[30.0, -12.0, -50.0, -12.0]]), np.array([[30.35, -12.2, -49.9, -12.2]])
     noise = 0.005 * Draws(3, Purpose.IMAGE).normal(40_000, 3)

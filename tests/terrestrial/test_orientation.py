@@ -81,16 +81,6 @@ def test_any_orientation_comes_back_from_points_without_errors(alpha: float, ome
     assert not found.rejected
 
 
-def test_two_points_are_enough_for_the_angles() -> None:
-    angles = (0.5, 0.1, -0.05)
-    found = orient(sightings(angles, places=PLACES[[0, 8]]), F, CENTRE)
-    np.testing.assert_allclose(found.values, angles, atol=1e-11)
-    assert found.dof == 1
-    lower, upper = found.sigma0_range(0.05)
-    assert lower < 0.1
-    assert upper > 2
-
-
 # ------------------------------------------------------------------------------------- against another adjustment
 
 

@@ -55,10 +55,9 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Adjust the strips of a project and report the accuracy.
 
     The report goes to stdout, in at most 120 lines; --verbose prints all of it, --section a part. With -o, DIR gets
-    result.json with everything, the tables points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv and
-    refined.csv, and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also
-    when it is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With
-    --compare-methods and -o, each method gets a folder of its own in DIR.
+    result.json with everything, its tables as CSV (points.csv, photos.csv, given_points.csv, residuals.csv ...),
+    refined.csv and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also when it is
+    LOOK or UNVERIFIED. With --compare-methods and -o, each method gets a folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.stderr import Messages
@@ -101,7 +100,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             pictures = result.pictures()
             write_files(plots, {f"{name}.svg": picture.file() for name, picture in pictures.items()})
             messages.say(f"wrote {len(pictures)} pictures to {plots}")
-    print_result(result.in_columns, form, width, Parts(quiet, verbose, section or ()))
+    print_result(result.document, form, width, Parts(quiet, verbose, section or ()))
     return exit_code(result.status, strict=strict)
 
 

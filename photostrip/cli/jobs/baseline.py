@@ -11,7 +11,7 @@ import typer
 
 from photostrip.comparison import Tolerances, baseline_of, compare_results
 from photostrip.errors import InputError
-from photostrip.formats.output.result_json import read_result, to_json
+from photostrip.formats.output.result_json import read_baseline, read_result, to_json
 from photostrip.formats.text.writing import write_text
 from photostrip.library.comparison import BASELINE, place_of, results_below
 from photostrip.report.commands.compare import headline
@@ -49,7 +49,7 @@ def update(result: Path, baseline: Path, allowed: Tolerances | None) -> str:
     text = f"wrote {place}"
     if place.exists():
         try:
-            found = compare_results(document, read_result(str(place)), allowed, (str(file), "the baseline before"))
+            found = compare_results(document, read_baseline(str(place)), allowed, (str(file), "the baseline before"))
             text += f"; {headline(found)}"
         except InputError:
             text += "; what stood there could not be compared with it"

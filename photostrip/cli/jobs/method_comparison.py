@@ -45,7 +45,7 @@ def compare_methods(
                 found[adjustment] = error
                 continue
             name = result.name
-            found[adjustment] = result.in_columns
+            found[adjustment] = result.document
             if output is not None:
                 result.write(output / adjustment, html=html)
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")

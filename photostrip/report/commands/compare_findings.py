@@ -41,13 +41,13 @@ def _findings(document: Document, line_of: Callable[[str, str], int]) -> Iterato
         if each["differs"]:
             for name in ("missing", "new"):
                 for row in each[name]:
-                    line = line_of(row["block"], row["id"])
+                    line = line_of(row["block"], "id")
                     yield _finding(document, line, f"{NAMES[each['kind']]}: {row['what']} is {name}")
     for row in document["lacking"]:
         if row["differs"]:
             yield _finding(document, line_of(row["block"], ""), lacking_words(document, row))
     for row in document["differences"]:
-        yield _finding(document, line_of(row["block"], row["id"]), sentence(row))
+        yield _finding(document, line_of(row["block"], row["name"].partition(".")[0]), sentence(row))
 
 
 def _finding(document: Document, line: int, message: str) -> Document:

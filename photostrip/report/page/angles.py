@@ -44,5 +44,4 @@ UNITS = {
 
 
 def angle_unit(document: Document) -> AngleUnit:
-    photos = document["photos"]
-    return UNITS[photos[0]["angles"]["unit"] if photos else "deg"]
+    return UNITS[document["angles"]["unit"]]

@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures.chart import Floats, Layer, Line, Marks, Panel, Segments, chart, span
-from photostrip.report.pictures.places import Plan, numbers
+from photostrip.report.pictures.places import Course, Plan, numbers
 from photostrip.report.pictures.plan import ROLES
 from photostrip.report.pictures.svg import Picture
 
@@ -70,19 +70,21 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
     at, shift = course.along(plan.points[after]), course.turned(plan.shift[after])
     earlier = [row for row in before if row["id"] in plan.row]
     earlier_at = course.along(plan.points[plan.rows(row["id"] for row in earlier)])
-    towards = np.array([[plan.north[1], plan.north[0], 0.0], [-plan.north[0], plan.north[1], 0.0], [0.0, 0.0, 1.0]])
-    missed = course.turned(numbers(earlier, "east", "north", "up") @ towards.T)
+    to_plan = Course(np.zeros(2), plan.north[::-1])  # of east, north and up
+    missed = course.turned(to_plan.turned(numbers(earlier, "east", "north", "up")))
     ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
     reach = span(np.concatenate([ends, at, earlier_at]), zero=False, room=0.02)
-    block = next((block for block in plan.document.get("polynomials", []) if block["strip"] == strip), None)
+    block = next((row for row in plan.document.get("polynomials", []) if row["strip"] == strip), None)
+    terms = list(plan.document["polynomial_terms"].where(strip=strip)) if block else []
     taken = plan.document["adjustment"] == "polynomial"
     panels = []
     for number, (axis, key) in enumerate(AXES):
         layers: list[Layer] = []
-        if block and block["degree"] and earlier and block["terms"][key]:
+        of_axis = [row for row in terms if row["axis"] == key]
+        if block and of_axis and earlier:
             places = np.linspace(min(*ends, *earlier_at), max(*ends, *earlier_at), CURVE_STEPS)
-            start = float(block["reach"][0]) - 1000.0 * float(earlier_at.min())  # X of the first photo
-            curve = np.column_stack([places, -polynomial(block, key, 1000.0 * places + start)])
+            start = float(block["reach_from"]) - 1000.0 * float(earlier_at.min())  # X of the first photo
+            curve = np.column_stack([places, -polynomial(of_axis, 1000.0 * places + start)])
             layers.append(Line(curve, "c2", "polynomial" if taken else "polynomial, not taken"))
         hints = [f"{row['id']} before: {size:+.3f} m" for row, size in zip(earlier, missed[:, number], strict=True)]
         at_before = np.column_stack([earlier_at, missed[:, number]])
@@ -100,13 +102,13 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
     return panels
 
 
-def polynomial(block: Document, axis: str, x: Floats) -> Floats:
+def polynomial(terms: Sequence[Document], x: Floats) -> Floats:
     """Return a polynomial on the axis of the strip, where terms with Y vanish."""
     total = np.zeros_like(x)
-    for term, coefficient in zip(block["terms"][axis], block["coefficients"][axis], strict=True):
-        power = re.fullmatch(r"(?:1|X(?:\^(\d))?)", term)
+    for row in terms:
+        power = re.fullmatch(r"(?:1|X(?:\^(\d))?)", row["term"])
         if power:
-            total += coefficient * x ** (0 if term == "1" else int(power[1] or 1))
+            total += row["coefficient"] * x ** (0 if row["term"] == "1" else int(power[1] or 1))
     return total
 
 

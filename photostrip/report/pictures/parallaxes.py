@@ -16,12 +16,18 @@ SHARE_ON_AXIS = 0.995  # share of the parallaxes that the axis holds; those beyo
 
 def parallax_pictures(document: Document) -> list[Picture]:
     """Draw the y parallaxes; nothing where none are known."""
-    pairs = document["parallaxes"]
+    pairs = list(document["models"])
+    number_of = {(pair["strip"], pair["left"]): n for n, pair in enumerate(pairs, 1)}
     rows = [
-        (n, zone, size, used, f"point {point} of {pair['left']} – {pair['right']}: {size:+.1f} µm")
-        for n, pair in enumerate(pairs, 1)
-        for point, size, used, zone in zip(pair["points"], pair["q_um"], pair["used"], pair["zone"], strict=True)
-        if size is not None and zone in ZONES
+        (
+            number_of[row["strip"], row["left"]],
+            row["zone"],
+            row["q_um"],
+            row["used"],
+            f"point {row['point']} of {row['left']} – {row['right']}: {row['q_um']:+.1f} µm",
+        )
+        for row in document["parallaxes"]
+        if row["q_um"] is not None and row["zone"] in ZONES
     ]
     if not rows:
         return []

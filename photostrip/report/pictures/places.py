@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
+MATRIX = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))  # of a rotation, by rows
 
 
 def numbers(rows: Sequence[Document], *keys: str) -> Floats:
@@ -48,18 +49,14 @@ class Rays(NamedTuple):
 
 
 def rays_of(document: Document) -> Rays:
-    rows = [row for row in document["residuals"] if row["points"]]
-
-    def column(key: str) -> Floats:
-        values = [row.get(key) or [None] * len(row["points"]) for row in rows]
-        return np.array([value for each in values for value in each], np.float64)
-
+    rays = document["residuals"]
+    tests = [rays[key] for key in ("test_x", "test_y") if key in rays.columns]
     return Rays(
-        photo=[row["photo"] for row in rows for _ in row["points"]],
-        point=[point for row in rows for point in row["points"]],
-        v=np.column_stack([column("vx_um"), column("vy_um")]),
-        used=np.array([used for row in rows for used in row["used"]], bool),
-        test=np.column_stack([column("test_x"), column("test_y")]),
+        photo=rays.values("photo"),
+        point=rays.values("point"),
+        v=np.column_stack([rays["vx_um"], rays["vy_um"]]),
+        used=rays["used"],
+        test=np.column_stack(tests) if tests else np.full((len(rays), 2), np.nan),
     )
 
 
@@ -71,9 +68,9 @@ class Course(NamedTuple):
 
     def turned(self, vectors: Floats) -> Floats:
         """Return vectors of the plan along the strip, to its left and up."""
-        x, y = self.direction
-        turn = np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
-        return np.asarray(vectors @ turn)
+        a, b = self.direction
+        x, y, up = np.moveaxis(np.asarray(vectors), -1, 0)  # what is not known of the plan leaves the height alone
+        return np.stack([x * a + y * b, y * a - x * b, up], axis=-1)
 
     def along(self, places: Floats) -> Floats:
         """Return distances from the first photo along the strip, km."""
@@ -165,8 +162,7 @@ def plan_of(document: Document) -> Plan:
         return course.turned(metres - [*course.start, 0.0])
 
     given = {row["id"]: row for row in document["control"] if row["measured"]}
-    axes = [photo["rotation"] or [np.nan] * 9 for photo in photos]
-    about = np.array(axes, np.float64).reshape(-1, 3, 3).swapaxes(1, 2)  # rows: image axes in the axes of the rotation
+    about = numbers(photos, *MATRIX).reshape(-1, 3, 3).swapaxes(1, 2)  # rows: image axes in the axes of the rotation
     azimuth = np.radians(numbers(points, "ellipse_azimuth_deg")[:, 0])
     towards = course.turned(np.column_stack([np.sin(azimuth), np.cos(azimuth), 0.0 * azimuth]))
     curved = frame["kind"] not in ("local", "geocentric")

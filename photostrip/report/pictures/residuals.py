@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.notes import Document, counted
+from photostrip.notes import counted
 from photostrip.report.pictures.chart import (
     Areas,
     Bar,
@@ -166,12 +166,12 @@ def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:
         limits, unit, sigma = [document["bundle"]["screening"]["limit"]], "", 1.0
         values, what = tests.ravel(), "image residuals, each over its own standard deviation"
     else:
-        pairs: list[Document] = document["parallaxes"] if limits else []
-        used = [zip(pair["q_um"], pair["used"], strict=True) for pair in pairs]
-        parallaxes = [size for pair in used for size, taken in pair if taken and size is not None]
-        values = np.array(parallaxes) if parallaxes else rays.v[known & rays.used].ravel()
-        limits, unit, sigma = limits if parallaxes else [], " µm", rms(values) or 1.0
-        what = "y parallaxes of the pairs" if parallaxes else "image residuals"
+        pairs = document["parallaxes"]
+        parallaxes = pairs["q_um"][pairs["used"] & np.isfinite(pairs["q_um"])] if limits else np.zeros(0)
+        found = len(parallaxes) > 0
+        values = parallaxes if found else rays.v[known & rays.used].ravel()
+        limits, unit, sigma = limits if found else [], " µm", rms(values) or 1.0
+        what = "y parallaxes of the pairs" if found else "image residuals"
     reach = max(LEAST_REACH * sigma, 1.1 * max(limits, default=0.0))
     edges, x = np.linspace(-reach, reach, BARS + 1), np.linspace(-reach, reach, 121)
     counts = np.histogram(np.clip(values, -reach, reach), edges)[0].tolist()

@@ -78,7 +78,7 @@ def classical_line(block: Document) -> str:
 
 def _degrees(block: Document) -> str:
     """Say which degrees the polynomials have, of several strips how many have each."""
-    number = Counter((each["degree"]["plan"], each["degree"]["height"]) for each in block["strips"])
+    number = Counter((each["degree_plan"], each["degree_height"]) for each in block["strips"])
     several = len(block["strips"]) > 1
     return ", ".join(
         (f"degree {plan} in plan and {height} in height" if plan or height else "none, the similarity alone")
@@ -212,7 +212,7 @@ CORRELATIONS = (
 
 def _calibration(document: Document) -> tuple[Shown, ...]:
     """Columns of the parameters of cameras: lengths also in pixels, where cameras have some."""
-    pixels = {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"] if "pixel_size_mm" in camera}
+    pixels = {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"] if camera["pixel_size_mm"]}
 
     def in_pixels(row: Document) -> str:
         pixel = pixels.get(row["camera"])
@@ -236,7 +236,7 @@ def _correlated(rows: Sequence[Document]) -> Iterator[Table]:
         camera: [n for n, row in enumerate(rows) if row["camera"] == camera] for camera in column_of(rows, "camera")
     }
     for camera, own in places.items():
-        if len(own) < 2 or not all("correlations" in rows[place] for place in own):  # results of older versions
+        if len(own) < 2:
             continue
         heads = [str(number) for number in range(1, len(own))]
         lines = tuple(

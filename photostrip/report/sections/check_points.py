@@ -10,7 +10,7 @@ from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
-from photostrip.report.sections.strip import ALL_SHOWN, column_of, only, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, column_of, worst_first
 
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
@@ -33,7 +33,7 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
         return Section("Check points", (Words(text),))
     text = "Adjusted minus given: how good the new points are."
     check = document.get("precision", {}).get("check")
-    if check and check["points"] and "p_plan" in check["points"][0]:  # results of older versions have no probabilities
+    if check and check["points"]:
         table = _tested(document, rows, everything=everything, most=most)
     else:
         table = given_table(document, rows, "check", everything=everything, most=most)
@@ -56,7 +56,7 @@ def _tested(document: Document, given: Sequence[Document], *, everything: bool, 
         shown.append({**row, **sigma, **likely})
     more = (words("use", "use", rank=2), words("strips", lambda row: ", ".join(row["strips"]), rank=3))
     seen = _Seen([check[part]["rms"] for part in PARTS], [_inside(check[part]) for part in PARTS])
-    odd = [row["id"] for row in given if row.get("stands_out")]
+    odd = [row["id"] for row in given if row["stands_out"]]
     without = f"rms of z without {listed(odd, IDS_NAMED)}" if odd else ""
     return _table(document, given, shown, more, seen, joined(note, MEANING, without))
 
@@ -149,7 +149,7 @@ def _least_likely(
     tested: Sequence[Document], given: Sequence[Document], *, everything: bool, most: int
 ) -> tuple[list[Document], str]:
     """Choose the points that are shown, the least likely first; the chances of all go again."""
-    unlikely = {row["id"]: _unlikely(row) for row in only(tested, "id", "p_plan", "p_height")}
+    unlikely = {row["id"]: _unlikely(row) for row in tested}
     where = ("points", "check", "control")
     return worst_first(given, lambda row: unlikely.get(row["id"], -1.0), where, everything=everything, most=most)
 

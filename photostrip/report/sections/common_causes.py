@@ -12,6 +12,7 @@ from photostrip.notes import Document, counted, listed
 from photostrip.report.page.numbers import metres, short, signed
 
 Row = tuple[str, str]
+AXES = "east", "north", "up"
 
 SENTENCES = {
     "offset": "offset of the camera positions of {of}",
@@ -30,12 +31,9 @@ ORDERS = {
 
 
 def taken_up(block: Document, most: int) -> Iterator[Row]:
-    """Say in a line for each cause what the project does not state and the adjustment went on with.
-
-    Results of older versions do not know it.
-    """
+    """Say in a line for each cause what the project does not state and the adjustment went on with."""
     causes: dict[str, list[Document]] = {}
-    for each in block.get("taken_up", []):
+    for each in block["taken_up"]:
         causes.setdefault(each["cause"], []).append(each)
     for cause, rows in causes.items():
         of = listed(map(_whose, rows), most)
@@ -49,7 +47,9 @@ def taken_up(block: Document, most: int) -> Iterator[Row]:
 
 def _whose(row: Document) -> str:
     if row["cause"] == "control list":
-        known = ((axis, step, row["sigma"][axis]) for axis, step in row["shift"].items() if step is not None)
+        known = (
+            (axis, row[f"shift_{axis}"], row[f"sigma_{axis}"]) for axis in AXES if row[f"shift_{axis}"] is not None
+        )
         steps = ", ".join(f"{signed(step)} m {axis} (σ {metres(sigma)})" for axis, step, sigma in known)
         return f"{row['of']}, which lies {steps} beside all else"
     if row["cause"].endswith("photo"):
@@ -67,7 +67,7 @@ class _Estimated(NamedTuple):
 def estimated(document: Document, most: int) -> Iterator[Row]:
     """Say in a line for each camera and group of positions what was estimated; of many the most significant."""
     block = document["bundle"]
-    pixels = {camera["id"]: camera.get("pixel_size_mm") for camera in document["cameras"]}
+    pixels = {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"]}
     found = [*_cameras(block, pixels), *_positions(block["corrections"])]
     for place in sorted(nlargest(most, range(len(found)), key=lambda place: found[place].size)):
         yield "estimated", found[place].text
@@ -108,8 +108,8 @@ def _strongest(rows: Sequence[Document], row: Document) -> tuple[str, float] | N
             each["parameter"].replace("_", " ") + (f" of {each['camera']}" if each["camera"] != row["camera"] else ""),
             value,
         )
-        for each, value in zip(rows, row.get("correlations", ()), strict=False)
-        if each is not row and value is not None
+        for each, value in zip(rows, row["correlations"], strict=False)
+        if (each["camera"], each["parameter"]) != (row["camera"], row["parameter"]) and value is not None
     ]
     return max(others, key=lambda pair: abs(pair[1]), default=None)
 
@@ -124,9 +124,7 @@ def _parameter(row: Document, pixel: float | None) -> str:
 
 
 def _positions(rows: Sequence[Document]) -> Iterator[_Estimated]:
-    """Results of older versions do not say of which group a correction is."""
-    known = (row for row in rows if "group" in row)
-    for group, corrections in groupby(known, key=itemgetter("group")):
+    for group, corrections in groupby(rows, key=itemgetter("group")):
         own = list(corrections)
         said = []
         for kind, parts in groupby(own, key=itemgetter("kind")):

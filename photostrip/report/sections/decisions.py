@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import LEAST_PROBABILITY, micrometres, short
@@ -29,7 +29,7 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     for block in document.get("polynomials", []):
         label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
         if block["asked"] == "auto":
-            yield label, _degree(block)
+            yield label, _degree(document["polynomial_evidence"].where(strip=block["strip"]))
     if "relative" in settings:
         yield from _screening(document, settings["relative"])
     elif settings["links"]["screening"] == "auto":
@@ -58,19 +58,19 @@ def _adjustment(document: Document) -> str:
     return "polynomial: no bundle could be had, the notes say why"
 
 
-def _degree(block: Document) -> str:
+def _degree(evidence: Sequence[Document]) -> str:
     """Say which degree was chosen in plan and in height, and what spoke for it."""
-    text = chosen_degrees(block)
+    text = chosen_degrees(evidence)
     if text == NO_DEGREE:
         return text
     return f"{text}; F is the ratio of the gain over the degree before, p its probability by chance"
 
 
-def chosen_degrees(block: Document) -> str:
+def chosen_degrees(evidence: Sequence[Document]) -> str:
     """Say of which degree a polynomial is, in plan and in height."""
     parts = []
     for group in ("plan", "height"):
-        chosen = [row for row in block["evidence"] if row["group"] == group and row["accepted"] and row["degree"]]
+        chosen = [row for row in evidence if row["group"] == group and row["accepted"] and row["degree"]]
         parts.append(f"{_step(chosen[-1])} in {group}" if chosen else f"none in {group}")
     if all(part.startswith("none") for part in parts):
         return NO_DEGREE
@@ -119,7 +119,7 @@ def weights_section(document: Document, *, everything: bool) -> Section:
     def sigma(key: str, place: int) -> Callable[[Document], float | None]:
         """Return what reads a standard deviation of a coordinate that counts: plan, height or both."""
         letter = "z" if place == up else "x"
-        return lambda row: row[key][place] if letter in row["use"] else None
+        return lambda row: row[f"{key}_{place + 1}"] if letter in row["use"] else None
 
     columns = (
         words("point", "id"),

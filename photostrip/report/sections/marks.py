@@ -60,31 +60,25 @@ def _length(mark: Document) -> float:
 def _marks(document: Document) -> Iterator[Document]:
     """Give the rays of given points, photo by photo, with their residuals."""
     roles = {row["id"]: row["role"] for row in document["control"]}
-    cameras, photos = cameras_of(document), document.get("residuals", ())
-    for row in photos.rows() if hasattr(photos, "rows") else photos:  # a million rays are not made at once
-        given = [place for place, point in enumerate(row["points"]) if point in roles]
-        if not given:
+    cameras = cameras_of(document)
+    for row in document["residuals"].where(point=set(roles)) if "residuals" in document else ():  # not of a baseline
+        x, y = row["vx_um"], row["vy_um"]
+        if x is None or y is None:
             continue
-        pixel = 1000.0 * cameras.get(row["photo"], {}).get("pixel_size_mm", 0.0)
+        pixel = 1000.0 * (cameras.get(row["photo"], {}).get("pixel_size_mm") or 0.0)
         unit, size = (PIXELS, pixel) if pixel else (MICROMETRES, 1.0)
-        points, xs, ys, used = row["points"], row["vx_um"], row["vy_um"], row["used"]
-        tests = list(zip(row["test_x"], row["test_y"], strict=True)) if "test_x" in row else None
-        for place in given:
-            x, y = xs[place], ys[place]
-            if x is None or y is None:
-                continue
-            test = None if tests is None or None in tests[place] else max(map(abs, tests[place]))
-            yield {
-                "point": points[place],
-                "role": roles[points[place]],
-                "photo": row["photo"],
-                "x": x / size,
-                "y": y / size,
-                "unit": unit,
-                "length": hypot(x, y) / size,
-                "test": test,
-                "used": used[place],
-            }
+        tests = [row.get("test_x"), row.get("test_y")]
+        yield {
+            "point": row["point"],
+            "role": roles[row["point"]],
+            "photo": row["photo"],
+            "x": x / size,
+            "y": y / size,
+            "unit": unit,
+            "length": hypot(x, y) / size,
+            "test": None if None in tests else max(map(abs, tests)),
+            "used": row["used"],
+        }
 
 
 def _summed(marks: Sequence[Document]) -> Iterator[tuple[str, str]]:

@@ -31,10 +31,8 @@ from photostrip.report.sections.strip import (
     DIRECTIONS,
     GROUND_AXES,
     column_of,
-    degree_of,
     elsewhere,
     photos_of,
-    rows_of,
 )
 from photostrip.report.sections.verdict import verdict_section
 
@@ -50,7 +48,6 @@ AROUND = 4  # lines of the title and of the end
 
 def overview(document: Document, width: int) -> tuple[Section, ...]:
     """Return the sections of the short report for a page of a width."""
-    document = {**document, "control": rows_of(document["control"])}  # gone through many times
     for most in MOST_OF_A_KIND:
         sections = _overview(document, most)
         if len(lay_out("", sections, width)) <= MOST_LINES - AROUND:
@@ -108,7 +105,7 @@ def _stages(document: Document, most: int) -> Rows:
     elif document["models"]:
         yield from _pairs(document)
     yield from _absolute(document["absolute"])
-    yield from _degrees(document.get("polynomials", []))
+    yield from _degrees(document)
     if "bundle" in document:
         yield "bundle adjustment", _bundle(document["bundle"])
         yield from common_causes.taken_up(document["bundle"], most)
@@ -119,7 +116,7 @@ def _stages(document: Document, most: int) -> Rows:
         yield "image residuals", f"rms {micrometres(summary['image_rms_um'])} µm"
     if "precision" in document:
         yield from _precision(document["precision"])
-    yield from _checked(document["counts"].get("points_checked"))
+    yield from _checked(document["counts"]["points_checked"])
 
 
 def _pairs(document: Document) -> Rows:
@@ -164,11 +161,11 @@ def _links(document: Document) -> Rows:
 
 def _differences(document: Document) -> str:
     """Say by how much neighbouring models differ; in the worst strip, where there are several."""
-    strips = [strip for strip in document["strips"] if strip["discrepancy"]["up"] is not None]
+    strips = [strip for strip in document["strips"] if strip["discrepancy_up"] is not None]
     if not strips:
         return "no common points"
-    worst = max(strips, key=lambda strip: strip["discrepancy"]["up"])
-    size = ", ".join(f"{metres(worst['discrepancy'][name])} m {name}" for name in DIRECTIONS)
+    worst = max(strips, key=lambda strip: strip["discrepancy_up"])
+    size = ", ".join(f"{metres(worst[f'discrepancy_{name}'])} m {name}" for name in DIRECTIONS)
     return f"rms {size}{_in_strip(worst['id'], strips)}"
 
 
@@ -178,16 +175,17 @@ def _in_strip(strip: str, strips: Sequence[object]) -> str:
 
 def _absolute(rows: Sequence[Document]) -> Rows:
     for row in _worst_of(rows, "sigma0", 1):
-        size = ", ".join(f"{metres(row['misclosure_rms'][axis])} m {axis}" for axis in GROUND_AXES)
+        size = ", ".join(f"{metres(row[f'misclosure_rms_{axis}'])} m {axis}" for axis in GROUND_AXES)
         yield "absolute orientation", f"misclosure rms {size}{_in_strip(row['strip'], rows)}"
 
 
-def _degrees(blocks: Sequence[Document]) -> Rows:
+def _degrees(document: Document) -> Rows:
     """Say of which degree the polynomials are; of several, how many strips have each."""
+    blocks = document.get("polynomials", [])
     if len(blocks) == 1:
-        yield "polynomial", chosen_degrees(blocks[0])
+        yield "polynomial", chosen_degrees(document["polynomial_evidence"])
     elif blocks:
-        number = Counter(tuple(degree_of(block["terms"][axis]) for axis in "xz") for block in blocks)
+        number = Counter((block["degree_plan"], block["degree_height"]) for block in blocks)
         found = (f"{plan} and {height} in {counted(number[plan, height], 'strip')}" for plan, height in sorted(number))
         yield "polynomials", f"degrees in plan and height: {', '.join(found)}"
 
@@ -203,9 +201,9 @@ def _bundle(block: Document) -> str:
     return f"{free}σ0 {fixed(block['sigma0'], 3)}, test {said}; {counted(out, 'observation')} rejected"
 
 
-def _checked(number: Document | None) -> Rows:
-    """Say of how many points an error along the base would not show; results of older versions do not know."""
-    if number and (number["across"] or number["none"]):
+def _checked(number: Document) -> Rows:
+    """Say of how many points an error along the base would not show."""
+    if number["across"] or number["none"]:
         text = f"{counted(number['across'], 'point')} checked only across the base, {number['none']} not at all"
         yield "unchecked", f"{text}; {number['along']} along it too"
 
@@ -255,7 +253,7 @@ def _likewise(rest: Sequence[Document]) -> str:
     strips = [note["strip"] for note in rest if note["strip"]]
     if len(strips) == len(rest):
         return f" (and the same for {'strip' if len(strips) == 1 else 'strips'} {listed(strips)})"
-    keys = [note["key"] for note in rest if "." in note.get("key", "")]
+    keys = [note["key"] for note in rest if "." in note["key"]]
     which = f", {listed(keys)}" if len(keys) == len(rest) else ""
     return f" (and {len(rest)} more like this{which}: --section notes)"
 

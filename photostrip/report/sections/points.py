@@ -28,7 +28,7 @@ def control_section(document: Document, *, everything: bool, most: int = ALL_SHO
         "Adjusted minus given. These points took part in the adjustment: what is left here is smaller than the errors "
         "between them."
     )
-    if any(row.get("rejected", "") for row in rows):
+    if any(row["rejected"] for row in rows):
         text += (
             " Coordinates with a minus under `use` were found wrong and were not used; the last lines leave them out."
         )
@@ -88,14 +88,14 @@ def given_table(document: Document, given: Sequence[Document], role: str, *, eve
 
 
 def _sigma(place: int) -> Callable[[Document], float | None]:
-    return lambda row: row["sigma"][place]
+    return lambda row: row[f"sigma_{place + 1}"]
 
 
 def _used(row: Document) -> str:
     """Coordinates that count, then with a minus those that were found wrong."""
-    if not row.get("rejected", ""):
+    if not row["rejected"]:
         return str(row["use"])
-    kept = "".join(letter for letter in row["use"] if letter not in row.get("rejected", ""))
+    kept = "".join(letter for letter in row["use"] if letter not in row["rejected"])
     return f"{kept} -{row['rejected']}".strip()
 
 
@@ -107,7 +107,7 @@ def largest(rows: Sequence[Document], key: str, axis: str) -> str:
 
 
 def _most(rows: Sequence[Document]) -> str:
-    known = (value for row in rows if (value := row["normalised"]) is not None and not row.get("rejected", ""))
+    known = (value for row in rows if (value := row["normalised"]) is not None and not row["rejected"])
     return ratio(max(known, default=None))
 
 
@@ -210,7 +210,7 @@ def rejected_section(document: Document, *, everything: bool) -> Section:
 
 def standing_rejections(document: Document) -> list[Document]:
     """Return the measurements that were rejected and not taken back."""
-    return [row for row in document["rejected"] if not row.get("readmitted", False)]
+    return [row for row in document["rejected"] if not row["readmitted"]]
 
 
 def _tested(key: str) -> Callable[[Document], str]:
@@ -245,5 +245,5 @@ def notes_section(document: Document, *, everything: bool) -> Section:
 
 
 def sentence_of(note: Document) -> str:
-    """Return a note with its place; results of older versions have none."""
-    return before(note.get("file", ""), note.get("line", 0), note.get("column", 0)) + str(note["message"])
+    """Return a note with its place."""
+    return before(note["file"], note["line"], note["column"]) + str(note["message"])

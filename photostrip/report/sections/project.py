@@ -23,7 +23,7 @@ def project_section(document: Document) -> Section:
         ("ground frame", document["frame"]["description"]),
         ("differences", meaning["dx, dy, dz"]),
         (f"at {scale} scale", f"metres divided by the denominator of the {scale} scale, in micrometres (µm)"),
-        ("rotations", f"{meaning['angles']}; {meaning['rotation']}"),
+        ("rotations", f"{meaning['angle_1 to angle_3']}; {meaning['r11 to r33']}"),
         *((f"camera {camera['id']}", camera_line(camera)) for camera in document["cameras"]),
         *_corrections(document["corrections"])[1 if models else 0 :],
         *(project_rows(document) if models else _of_photos(document["settings"])),
@@ -39,21 +39,22 @@ def _of_photos(settings: Document) -> list[tuple[str, str]]:
 def fiducials_section(document: Document, *, everything: bool) -> Section:
     """Interior orientation: the transformation of each photo, and what is left at its marks."""
     rows, unit = document["fiducials"], angle_unit(document)
-    marks = [
-        {"photo": row["photo"], "mark": mark, "vx": vx, "vy": vy}
-        for row in rows
-        for mark, vx, vy in zip(row["marks"], row["vx_um"], row["vy_um"], strict=True)
-    ]
-    photos, note = worst_first(rows, _largest, ("photos", "fiducials", "fiducials"), everything=everything)
-    shown, rest = worst_first(
-        marks, lambda mark: hypot(mark["vx"], mark["vy"]), ("marks", "fiducials", "fiducials"), everything=everything
-    )
+    marks = list(document["fiducial_marks"])
+    largest: dict[str, float] = {}
+    for mark in marks:
+        largest[mark["photo"]] = max(largest.get(mark["photo"], 0.0), _length(mark))
+
+    def worst(row: Document) -> float:
+        return largest.get(row["photo"], 0.0)
+
+    photos, note = worst_first(rows, worst, ("photos", "fiducials", "fiducials"), everything=everything)
+    shown, rest = worst_first(marks, _length, ("marks", "fiducials", "fiducial_marks"), everything=everything)
     shapes = (
         words("photo", "photo"),
         words("transformation", "transform"),
-        number("marks", lambda row: len(row["marks"])),
+        number("marks", "marks"),
         number("σ0", "sigma0_um", 1, "µm"),
-        number("largest", _largest, 1, "µm"),
+        number("largest", worst, 1, "µm"),
         number("scale x", "scale_x", 6),
         number("scale y", "scale_y", 6),
         angle("turn", "rotation_deg", 4, unit, rank=1),
@@ -70,8 +71,8 @@ def fiducials_section(document: Document, *, everything: bool) -> Section:
     residuals = (
         words("photo", "photo"),
         words("mark", "mark"),
-        number("v x", "vx", 1, "µm"),
-        number("v y", "vy", 1, "µm"),
+        number("v x", "vx_um", 1, "µm"),
+        number("v y", "vy_um", 1, "µm"),
     )
     tables = (
         tabulated(photos, shapes, note=joined(note, "scale: photo over measured; turn, shear: counter-clockwise")),
@@ -88,8 +89,8 @@ def _coefficient(term: int) -> Callable[[tuple[Document, int]], float]:
     return lambda pair: float(pair[0]["coefficients"][pair[1]][term])
 
 
-def _largest(row: Document) -> float:
-    return max((hypot(vx, vy) for vx, vy in zip(row["vx_um"], row["vy_um"], strict=True)), default=0.0)
+def _length(mark: Document) -> float:
+    return hypot(mark["vx_um"], mark["vy_um"])
 
 
 def adjustment_of(document: Document) -> str:
@@ -108,7 +109,7 @@ def cameras_of(document: Document) -> dict[str, Document]:
     """Return the camera of each photo, as far as the result says it; of a single photo older ones may not."""
     cameras = {row["id"]: row for row in document["cameras"]}
     of_strip = {strip["id"]: cameras[strip["camera"]] for strip in document["strips"] if strip["camera"] in cameras}
-    single = {photo: camera for camera in cameras.values() for photo in camera.get("single_photos", ())}
+    single = {photo: camera for camera in cameras.values() for photo in camera["single_photos"]}
     only = next(iter(cameras.values())) if len(cameras) == 1 else None
     found = {photo["id"]: single.get(photo["id"]) or of_strip.get(photo["strip"], only) for photo in document["photos"]}
     return {photo: camera for photo, camera in found.items() if camera is not None}
@@ -119,7 +120,7 @@ def camera_line(camera: Document) -> str:
     text = f"principal distance {camera['principal_distance_mm']:g} mm, principal point {x0:g}, {y0:g} mm"
     if camera["format_mm"]:
         text += ", format {:g} x {:g} mm".format(*camera["format_mm"])
-    if "pixel_size_mm" in camera:
+    if camera["pixel_size_mm"]:
         text += f", pixels of {1000 * camera['pixel_size_mm']:g} µm"
     return f"{text}, {'distortion ' + camera['distortion'] if camera['distortion'] else 'no distortion'}"
 

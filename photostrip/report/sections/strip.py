@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from heapq import nlargest
@@ -16,7 +15,6 @@ from photostrip.report.page.tables import Shown, angle, number, tabulated, words
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place
-MOST_MADE = 5000  # rows; one takes 1400 bytes, and not made is read in ten times the time
 STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 WORST_SHOWN = 12  # rows shown of a longer one
 ELEMENTS = (("alpha1", "α1"), ("kappa1", "κ1"), ("alpha2", "α2"), ("omega2", "ω2"), ("kappa2", "κ2"))
@@ -45,19 +43,8 @@ def worst_first(
 
 
 def column_of(rows: Sequence[Document], key: str) -> list[Any]:
-    """Return the values of a key; from records that are kept as columns without making them."""
-    columns = getattr(rows, "columns", None) if len(rows) else None
-    return [row.get(key) for row in rows] if columns is None else list(columns[key])
-
-
-def rows_of(rows: Sequence[Document]) -> Sequence[Document]:
-    """Return rows that can be gone through many times; many that are kept as columns without making them."""
-    return rows.rows() if hasattr(rows, "rows") and len(rows) > MOST_MADE else list(rows)
-
-
-def only(rows: Sequence[Document], *keys: str) -> Sequence[Document]:
-    """Return rows to be gone through for some keys, of those that are kept as columns these columns alone."""
-    return rows.only(*keys) if hasattr(rows, "only") else rows
+    """Return the values of a key; of a table without making its rows."""
+    return list(rows.values(key)) if hasattr(rows, "values") else [row[key] for row in rows]
 
 
 def elsewhere(rest: int, what: str, section: str, block: str) -> str:
@@ -110,13 +97,13 @@ def _pairs(unit: AngleUnit) -> tuple[Shown, ...]:
 
 
 def _largest_sigma(model: Document) -> float | None:
-    return max((model["sigmas"][key] for key, _ in ELEMENTS if model["sigmas"][key] is not None), default=None)
+    return max((size for key, _ in ELEMENTS if (size := model[f"sigmas_{key}"]) is not None), default=None)
 
 
 def _elements(unit: AngleUnit) -> tuple[Shown, ...]:
     return (
         words("photos", photos_of),
-        *(angle(name, f"elements.{key}", 4, unit) for key, name in ELEMENTS),
+        *(angle(name, f"elements_{key}", 4, unit) for key, name in ELEMENTS),
         angle("largest σ", _largest_sigma, 4, unit, rank=1),
     )
 
@@ -133,8 +120,8 @@ def junction_section(document: Document, *, everything: bool) -> Section:
         number("rej.", lambda junction: len(junction["points_rejected"])),
         number("scale ratio", "factor", 6, rank=2),
         number("spread", "spread_ppm", 0, "ppm"),
-        *(number(name, f"discrepancy.{name}", 3, "m") for name in DIRECTIONS),
-        *(number(name, f"discrepancy_um.{name}", 1, "µm", rank=1 if name == "up" else 3) for name in DIRECTIONS),
+        *(number(name, f"discrepancy_{name}", 3, "m") for name in DIRECTIONS),
+        *(number(name, f"discrepancy_um_{name}", 1, "µm", rank=1 if name == "up" else 3) for name in DIRECTIONS),
         words("strip", "strip", rank=4),
     )
     below = note or "rms differences of the pass points of two models; spread: of the scale ratio of one pass point"
@@ -149,14 +136,12 @@ def _labelled(document: Document, strip: str, label: str) -> str:
 
 
 def _drift(strip: Document) -> str:
-    drift, along = strip["scale_drift"], strip["discrepancy"]
-    text = f"{fixed(drift['expected_ppm'], 0)} ppm expected over the strip (one standard deviation)"
-    if drift["found_ppm"] is not None:
-        text += f", {fixed(drift['found_ppm'], 0)} ppm by the polynomial"
-    if along["up"] is not None:
-        text += (
-            f"; rms differences between models {', '.join(f'{metres(along[name])} m {name}' for name in DIRECTIONS)}"
-        )
+    text = f"{fixed(strip['scale_drift_expected_ppm'], 0)} ppm expected over the strip (one standard deviation)"
+    if strip["scale_drift_found_ppm"] is not None:
+        text += f", {fixed(strip['scale_drift_found_ppm'], 0)} ppm by the polynomial"
+    if strip["discrepancy_up"] is not None:
+        size = ", ".join(f"{metres(strip[f'discrepancy_{name}'])} m {name}" for name in DIRECTIONS)
+        text += f"; rms differences between models {size}"
     return text
 
 
@@ -164,34 +149,29 @@ def absolute_section(document: Document) -> Section:
     """Absolute orientation: the fit of each strip to its control before any polynomial."""
     columns = (
         words("strip", "strip"),
-        number("plan", "control.plan", unit="points"),
-        number("height", "control.height", unit="points"),
+        number("plan", "control_plan", unit="points"),
+        number("height", "control_height", unit="points"),
         number("σ0", "sigma0", 2),
         number("redund.", "redundancy"),
         number("condition", "condition", partial(short, digits=3), rank=1),
-        *(number(axis, f"misclosure_rms.{axis}", 3, "m") for axis in GROUND_AXES),
+        *(number(axis, f"misclosure_rms_{axis}", 3, "m") for axis in GROUND_AXES),
         number("scale", "scale", 3, "m per mm", rank=3)
         if "links" in document
         else number("base of scale", "scale", 3, "m", rank=3),
-        *(angle(name, _angle(key), 4, angle_unit(document), rank=2) for key, name in ANGLES),
+        *(angle(name, f"angles_deg_{key}", 4, angle_unit(document), rank=2) for key, name in ANGLES),
     )
     note = (
         "east, north, up: rms misclosures of the similarity; σ0: their ratio to what is expected from the "
         "control and one model"
     )
-    weights = tuple((_labelled(document, s["id"], "weights"), _weights(s["precision"])) for s in document["strips"])
+    weights = tuple((_labelled(document, s["id"], "weights"), _weights(s)) for s in document["strips"])
     return Section("Absolute orientation", (tabulated(document["absolute"], columns, note=note), Facts(weights)))
 
 
-def _angle(key: str) -> Callable[[Document], float | None]:
-    """Return what reads an angle of the absolute orientation, where it is known."""
-    return lambda row: row["angles_deg"][key] if row["angles_deg"] else None
-
-
-def _weights(precision: Document) -> str:
+def _weights(strip: Document) -> str:
     return (
         "from the standard deviation of each control coordinate, combined with that of a model point: "
-        f"{metres(precision['plan'])} m in plan, {metres(precision['height'])} m in height"
+        f"{metres(strip['precision_plan'])} m in plan, {metres(strip['precision_height'])} m in height"
     )
 
 
@@ -199,12 +179,13 @@ def polynomial_section(document: Document, *, everything: bool) -> Section:
     """Polynomial adjustment: what was chosen, why, and how large it is."""
     blocks = document["polynomials"]
     if len(blocks) > STRIPS_SHOWN and not everything:
-        return Section("Polynomial adjustment", (_by_strip(blocks),))
+        return Section("Polynomial adjustment", (_by_strip(document),))
     parts: list[Part] = []
     for block in blocks:
-        parts += (Words(_choice(document, block) + _leverage(document, block)), _evidence(block))
-        if block["degree"]:
-            parts.append(_coefficients(block))
+        evidence, terms = (document[f"polynomial_{name}"].where(strip=block["strip"]) for name in ("evidence", "terms"))
+        parts += (Words(_choice(document, block) + _leverage(document, block)), _evidence(evidence))
+        if terms:
+            parts.append(tabulated(terms, COEFFICIENTS, note=OF_COEFFICIENTS))
     return Section("Polynomial adjustment", tuple(parts))
 
 
@@ -212,7 +193,7 @@ def _leverage(document: Document, block: Document) -> str:
     """Say which control points hold the polynomial almost alone: their own errors hardly show in it."""
     found = []
     for row in document.get("misclosures", ()):
-        shares = {axis: row.get("leverage", {}).get(axis) for axis in "xyz"}
+        shares = {axis: row[f"leverage_{axis}"] for axis in "xyz"}
         known = {axis: share for axis, share in shares.items() if share is not None}
         if row["strip"] == block["strip"] and known:
             axis = max(known, key=lambda name: known[name])
@@ -227,41 +208,38 @@ def _leverage(document: Document, block: Document) -> str:
     return text + "."
 
 
-def _by_strip(blocks: Sequence[Document]) -> Table:
-    def degree(axis: str) -> Callable[[Document], int]:
-        return lambda block: degree_of(block["terms"][axis])
+def _by_strip(document: Document) -> Table:
+    largest: dict[tuple[str, str], float] = {}
+    for row in document["polynomial_terms"]:
+        place = row["strip"], row["axis"]
+        largest[place] = max(largest.get(place, 0.0), abs(row["effect"]))
 
     def effect(axis: str) -> Callable[[Document], float]:
-        return lambda block: max(map(abs, block["effects"][axis]), default=0.0)
+        return lambda block: largest.get((block["strip"], axis), 0.0)
 
     columns = (
         words("strip", "strip"),
         number("asked", "asked"),
-        number("plan", degree("x"), unit="degree"),
-        number("height", degree("z"), unit="degree"),
-        number("plan", "stations.plan", unit="stations"),
-        number("height", "stations.height", unit="stations"),
+        number("plan", "degree_plan", unit="degree"),
+        number("height", "degree_height", unit="degree"),
+        number("plan", "stations_plan", unit="stations"),
+        number("height", "stations_height", unit="stations"),
         *(number(f"{axis.upper()} effect", effect(axis), 3, "m") for axis in "xyz"),
     )
-    note = "effect: of the largest term; evidence and coefficients are in `polynomials` of result.json"
-    return tabulated(blocks, columns, note=note)
+    note = "effect: of the largest term; evidence and terms: `polynomial_evidence`, `polynomial_terms` in result.json"
+    return tabulated(document["polynomials"], columns, note=note)
 
 
 def _choice(document: Document, block: Document) -> str:
     how = "chosen on the evidence below" if block["asked"] == "auto" else f"degree {block['asked']} as requested"
-    plan, height = (degree_of(block["terms"][axis]) for axis in ("x", "z"))
+    plan, height = block["degree_plan"], block["degree_height"]
     what = "no polynomial" if not block["degree"] else f"degree {plan} in plan and {height} in height"
-    stations, (low, high) = block["stations"], block["reach"]
     text = (
-        f"{what}, {how}. The control lies at {counted(stations['plan'], 'station')} in plan and {stations['height']} "
-        f"in height, from X = {low:.0f} m to {high:.0f} m along the strip."
+        f"{what}, {how}. The control lies at {counted(block['stations_plan'], 'station')} in plan and "
+        f"{block['stations_height']} in height, from X = {block['reach_from']:.0f} m to {block['reach_to']:.0f} m "
+        "along the strip."
     )
     return text[0].upper() + text[1:] if len(document["strips"]) == 1 else f"Strip {block['strip']}: {text}"
-
-
-def degree_of(terms: Sequence[str]) -> int:
-    """Return the highest power of X among the names of terms: 2 of X^2Y."""
-    return max((int(found[1] or 1) for term in terms if (found := re.search(r"X(?:\^(\d))?", term))), default=0)
 
 
 EVIDENCE = (
@@ -277,8 +255,7 @@ EVIDENCE = (
 )
 
 
-def _evidence(block: Document) -> Table:
-    steps = block["evidence"]
+def _evidence(steps: Sequence[Document]) -> Table:
     by = sorted({step["left_out_by"] for step in steps if step["left_out_by"]})
     note = (
         f"rms: at the control; left out: at control held back, one {' or '.join(by) or 'point'} at a time; "
@@ -288,24 +265,14 @@ def _evidence(block: Document) -> Table:
 
 
 COEFFICIENTS = (
-    words("axis", "axis"),
-    words("term", "terms"),
-    number("coefficient", "coefficients", power),
-    number("σ", "sigmas", partial(power, digits=1)),
+    words("axis", lambda row: row["axis"].upper()),
+    words("term", "term"),
+    number("coefficient", "coefficient", power),
+    number("σ", "sigma", partial(power, digits=1)),
     number("t", "t", 2),
-    number("effect", "effects", 3, "m"),
+    number("effect", "effect", 3, "m"),
 )
-
-
-def _coefficients(block: Document) -> Table:
-    keys = ("terms", "coefficients", "sigmas", "t", "effects")
-    rows = [
-        {"axis": axis.upper(), **dict(zip(keys, values, strict=True))}
-        for axis in "xyz"
-        for values in zip(*(block[key][axis] for key in keys), strict=True)
-    ]
-    note = (
-        "X along the strip, Y to its left, Z up, metres; effect: at the end of the control's range and the edge of the "
-        "strip; t: coefficient over its standard deviation σ; 2 or more is hardly due to chance"
-    )
-    return tabulated(rows, COEFFICIENTS, note=note)
+OF_COEFFICIENTS = (
+    "X along the strip, Y to its left, Z up, metres; effect: at the end of the control's range and the edge of the "
+    "strip; t: coefficient over its standard deviation σ; 2 or more is hardly due to chance"
+)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +19,8 @@ from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
 from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.photos import ImageResiduals
-from photostrip.result.quantities import grouped, record, records
-from photostrip.result.records import Records, as_records
+from photostrip.result.quantities import record
+from photostrip.result.table import Table
 from photostrip.statistics import TEST_LEVEL
 from photostrip.units import MICROMETRES
 
@@ -76,35 +75,46 @@ def bundle_of(result: Result) -> Document:
         },
         "iterations": len(solution.steps),
         "adjustments": screened.rounds,
-        "convergence": [
-            {
-                "chi_square": step.chi_square,
-                "length": step.length,
-                "damping": step.damping,
-                "shift": step.shift,
-                "turn_deg": np.degrees(step.turn),
-            }
-            for step in solution.steps
-        ],
+        "convergence": Table.of_rows(
+            "bundle.convergence",
+            (
+                {
+                    "chi_square": step.chi_square,
+                    "length": step.length,
+                    "damping": step.damping,
+                    "shift": step.shift,
+                    "turn_deg": np.degrees(step.turn),
+                }
+                for step in solution.steps
+            ),
+        ),
         "screening": _screening(found, settings, written),
         "reliability": {
             "power": settings.power,
             "noncentrality": shift[reliability.IMAGE],
-            "groups": [_group(group, shift[group.kind], written[group.kind]) for group in found.groups],
-            "weakest": _foremost(found, shift, written, [-group.redundancy for group in found.groups]),
-            "worst": _foremost(found, shift, written, [np.abs(group.standardised) for group in found.groups]),
+            "groups": Table.of_rows(
+                "bundle.reliability.groups",
+                (_group(group, shift[group.kind], written[group.kind]) for group in found.groups),
+            ),
+            "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in found.groups]),
+            "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in found.groups]),
         },
-        "variance_components": _components(found),
-        "calibration": _calibration(found),
-        "correlations": [asdict(each) for each in found.correlations],
-        "given": Records.joined(
-            records("bundle.given", _observed(found, group, np.argwhere(known), shift[group.kind], written[group.kind]))
-            for group in found.groups
-            if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
+        "variance_components": Table.of_rows("bundle.variance_components", _components(found)),
+        "calibration": Table.of_rows("bundle.calibration", _calibration(found)),
+        "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
+        "given": Table.joined(
+            "bundle.given",
+            (
+                Table.of(
+                    "bundle.given", _observed(found, group, np.argwhere(known), shift[group.kind], written[group.kind])
+                )
+                for group in found.groups
+                if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
+            ),
         ),
-        "positions": list(_positions(found)),
-        "corrections": list(_corrections(found)),
-        "taken_up": list(_taken_up(found)),
+        "positions": Table.of_rows("bundle.positions", _positions(found)),
+        "corrections": Table.of_rows("bundle.corrections", _corrections(found)),
+        "taken_up": Table.of_rows("bundle.taken_up", _taken_up(found)),
     }
     return {"bundle": record("bundle", block)}
 
@@ -176,7 +186,8 @@ def _positions(found: Bundle) -> Iterator[Document]:
     moved = np.where(np.isfinite(given.sigma), found.screened.solution.position_residuals, np.nan)
     for row, (east, north, up) in enumerate(moved):
         photo = problem.photo_name(int(given.photo[row]))
-        yield {"photo": photo, "d_east": east, "d_north": north, "d_up": up, "sigma": sigma[row]}
+        of_axes = {f"sigma_{axis}": value for axis, value in zip(GROUND_AXES, sigma[row], strict=True)}
+        yield {"photo": photo, "d_east": east, "d_north": north, "d_up": up, **of_axes}
 
 
 def _corrections(found: Bundle) -> Iterator[Document]:
@@ -215,11 +226,12 @@ def _taken_up(found: Bundle) -> Iterator[Document]:
             of = problem.camera_ids[each.number]
         elif each.kind in OF_PHOTOS:
             of = problem.photo_name(each.number)
-        shift, sigma = (
-            dict(zip(GROUND_AXES, size or (np.nan,) * len(GROUND_AXES), strict=True))
-            for size in (each.shift, each.sigma)
-        )
-        yield {"cause": each.kind, "of": of, "rivals": list(each.rivals), "shift": shift, "sigma": sigma}
+        sizes = {
+            f"{name}_{axis}": value
+            for name, size in (("shift", each.shift), ("sigma", each.sigma))
+            for axis, value in zip(GROUND_AXES, size or (np.nan,) * len(GROUND_AXES), strict=True)
+        }
+        yield {"cause": each.kind, "of": of, "rivals": list(each.rivals), **sizes}
 
 
 def image_fit(found: Bundle) -> Document:
@@ -254,10 +266,10 @@ def _group(group: reliability.Group, shift: float, kind: GroupKind) -> Document:
     }
 
 
-def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals: Records) -> Records | list[Document]:
-    """Add to the list ``residuals`` how well each ray is checked by the others; None for rays that took no part.
+def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals: Table) -> Table:
+    """Add to the table ``residuals`` how well each ray is checked by the others; None for rays that took no part.
 
-    Without a bundle adjustment the list stays as it is.
+    Without a bundle adjustment the table stays as it is.
     """
     found = result.bundle
     if found is None or result.model_strips:
@@ -270,14 +282,12 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     used = found.block.rows[found.screened.selection.images]
     row_of[used] = np.arange(len(used))
     at = row_of[np.concatenate([image.rows for image in images])]
-    ends = [0, *accumulate(len(each["points"]) for each in residuals)]
-    added = grouped("residuals", {}, dict(zip(RELIABILITY, values[at].T, strict=True)), ends)
-    return [each | more for each, more in zip(residuals, added, strict=True)]
+    return residuals.with_columns(**dict(zip(RELIABILITY, values[at].T, strict=True)))
 
 
 def _foremost(
-    found: Bundle, shift: Mapping[str, float], written: Mapping[str, GroupKind], values: list[Floats]
-) -> list[Document]:
+    name: str, found: Bundle, shift: Mapping[str, float], written: Mapping[str, GroupKind], values: list[Floats]
+) -> Table:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
     for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
@@ -289,8 +299,9 @@ def _foremost(
     for _, number, at in sorted(chosen)[:SHOWN]:
         group = found.groups[number]
         place = np.array([divmod(at, group.sigma.shape[1])])
-        rows += as_records(_observed(found, group, place, shift[group.kind], written[group.kind]))
-    return rows
+        columns = _observed(found, group, place, shift[group.kind], written[group.kind])
+        rows.append({key: column[0] for key, column in columns.items()})
+    return Table.of_rows(f"bundle.reliability.{name}", rows)
 
 
 def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float, kind: GroupKind) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from photostrip.points import locate
 from photostrip.result.numbers import rms
 from photostrip.result.points.given import differences, of_used
 from photostrip.result.quantities import record
+from photostrip.result.table import Table
 from photostrip.strip.polynomial_terms import degree_of
 
 
@@ -37,13 +38,14 @@ def classical_of(result: Result) -> Document:
         f"{role}_rms": {"plan": rms(found.plan[rows]), "height": rms(found.height[rows])}
         for role, rows in roles.items()
     }
-    return {"classical": {"strips": [_degrees(strip) for strip in strips], **record("classical", left)}}
+    of_strips = Table.of_rows("classical.strips", map(_degrees, strips))
+    return {"classical": record("classical", {"strips": of_strips, **left})}
 
 
 def _degrees(strip: StripResult) -> Document:
     terms = [] if strip.polynomial is None else [axis.terms for axis in strip.polynomial.axes]
     plan, _, height = map(degree_of, terms)
-    return record("classical.strips", {"strip": strip.strip.id, "degree": {"plan": plan, "height": height}})
+    return {"strip": strip.strip.id, "degree_plan": plan, "degree_height": height}
 
 
 def _strip_by_strip(result: Result, strips: Sequence[StripResult]) -> Result:

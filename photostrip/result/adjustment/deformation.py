@@ -14,6 +14,7 @@ from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.planning.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
+from photostrip.result.table import Table
 from photostrip.statistics import t_p_value
 from photostrip.strip.absolute_orientation import Targets
 from photostrip.units import ARCSECONDS, MILLIMETRES
@@ -122,11 +123,12 @@ def deformations_of(result: Result) -> Document:
     for strip, model in found:
         left, right = strip.strip.photos[model.model : model.model + 2]
         deformed = _deformation(model, LEVEL / (2 * len(found)))
-        rows.append(record("deformations", {"strip": strip.strip.id, "left": left, "right": right, **deformed}))
+        rows.append({"strip": strip.strip.id, "left": left, "right": right, **deformed})
     if not rows:
         return {}
     common = {name: _common([model for _, model in found], k) for k, name in enumerate(TERMS)}
-    return {"deformations": rows, "common_deformation": record("common_deformation", common)}
+    table = Table.of_rows("deformations", rows)
+    return {"deformations": table, "common_deformation": record("common_deformation", common)}
 
 
 def _common(models: Sequence[ModelDeformation], term: int) -> Document:
@@ -150,15 +152,14 @@ def _deformation(model: ModelDeformation, level: float) -> Document:
     limit = surface.critical(level)
     chance = min(surface.p_values) * LEVEL / level  # of all tests together
     omega, alpha = (angle * ARCSECONDS for angle in model.elements)
-    terms = {
-        name: {
-            "coefficient_m_per_mm2": surface.coefficients[3 + k],
-            "sigma_m_per_mm2": surface.sigmas[3 + k],
-            "t": surface.t_values[k],
-            "at_corner_m": model.at_corner[k],
+    terms: Document = {}
+    for k, name in enumerate(TERMS):
+        terms |= {
+            f"{name}_coefficient_m_per_mm2": surface.coefficients[3 + k],
+            f"{name}_sigma_m_per_mm2": surface.sigmas[3 + k],
+            f"{name}_t": surface.t_values[k],
+            f"{name}_at_corner_m": model.at_corner[k],
         }
-        for k, name in enumerate(TERMS)
-    }
     return {
         "points": list(model.points),
         "redundancy": surface.redundancy,

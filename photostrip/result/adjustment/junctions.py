@@ -8,8 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.result.quantities import records
-from photostrip.result.records import Records
+from photostrip.result.table import Table
 from photostrip.strip.formed_strip import FormedStrip
 
 DIRECTIONS = ("along", "across", "up")
@@ -29,13 +28,13 @@ def discrepancies(strip: StripResult) -> Floats:
     return np.asarray(similarity.scale * gap @ similarity.rotation.T, float)
 
 
-def junctions_of(result: Result) -> Records:
+def junctions_of(result: Result) -> Table:
     """Return the list ``junctions``: the scale transfer at every photo that joins two models."""
     ids = result.refined.observations.point_ids
-    return Records.joined(_junctions(strip, ids) for strip in result.photo_strips)
+    return Table.joined("junctions", (_junctions(strip, ids) for strip in result.photo_strips))
 
 
-def _junctions(strip: StripResult, ids: Sequence[str]) -> Records:
+def _junctions(strip: StripResult, ids: Sequence[str]) -> Table:
     photos, joined = strip.strip.photos, strip.of_photos.formed.junctions
     count, gap = len(joined.factor), discrepancies(strip)
     known = joined.used & ~np.isnan(gap[:, 0])  # points left out later, for their rays, have no place in the models
@@ -52,7 +51,12 @@ def _junctions(strip: StripResult, ids: Sequence[str]) -> Records:
         "points_rejected": left_out,
         "factor": joined.factor,
         "spread_ppm": joined.spread * PPM,
-        "discrepancy": dict(zip(DIRECTIONS, size.T, strict=True)),
-        "discrepancy_um": dict(zip(DIRECTIONS, size.T / strip.scale_number * PPM, strict=True)),
+        **along_the_strip("discrepancy", size),
+        **along_the_strip("discrepancy_um", size / strip.scale_number * PPM),
     }
-    return records("junctions", columns)
+    return Table.of("junctions", columns)
+
+
+def along_the_strip(name: str, values: Floats) -> dict[str, Floats]:
+    """Return columns, or numbers, of values along the strip, across it and up: the last axis of an array."""
+    return {f"{name}_{direction}": column for direction, column in zip(DIRECTIONS, values.T, strict=True)}

@@ -8,10 +8,10 @@ from photostrip.arrays import Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
+from photostrip.result.adjustment.junctions import PPM, along_the_strip, discrepancies
 from photostrip.result.numbers import rms
-from photostrip.result.quantities import grouped, record, records
-from photostrip.result.records import Records
+from photostrip.result.quantities import MATRIX
+from photostrip.result.table import Table
 
 
 def sigma0(strip: StripResult) -> float:
@@ -33,12 +33,12 @@ def expected_drift(strip: StripResult) -> float:
     return float(np.sqrt(links.solved.cofactors[:, 6, 6].sum() * links.factor)) if links.shared.count else float("nan")
 
 
-def models_of(result: Result) -> list[Document]:
+def models_of(result: Result) -> Table:
     """Return the list ``models``: what each model holds and how it lies in its strip, in flight order."""
-    return [model for strip in result.model_strips for model in _models(strip)]
+    return Table.joined("models", map(_models, result.model_strips))
 
 
-def _models(strip: StripResult) -> Records:
+def _models(strip: StripResult) -> Table:
     formed, models, photos = strip.of_models.formed, strip.of_models.formed.models, strip.strip.photos
     point = models.node < models.points
     used = np.bincount(models.model[point & formed.used], minlength=models.count)
@@ -47,7 +47,7 @@ def _models(strip: StripResult) -> Records:
         "id": strip.of_models.strip.models,
         "left": photos[:-1],
         "right": photos[1:],
-        **dict.fromkeys(("elements", "sigma0_um", "rms_parallax_um", "max_parallax_um")),
+        **dict.fromkeys(("sigma0_um", "rms_parallax_um", "max_parallax_um")),
         "points_used": used,
         "points_rejected": np.bincount(models.model[point], minlength=models.count) - used,
         "centers": np.bincount(models.model[~point], minlength=models.count),
@@ -56,14 +56,14 @@ def _models(strip: StripResult) -> Records:
         "base_formed": np.linalg.norm(np.diff(formed.centers, axis=0), axis=1) * strip.absolute.similarity.scale,
         "scale_factor": formed.places.scale,
         "model_scale": strip.of_models.scales,
-        "rotation": strip.of_models.rotations.reshape(-1, 9),
+        **dict(zip(MATRIX, strip.of_models.rotations.reshape(-1, 9).T, strict=True)),
     }
-    return records("models", columns)
+    return Table.of("models", columns)
 
 
-def links_of(result: Result) -> list[Document]:
+def links_of(result: Result) -> Table:
     """Return the list ``links``: how every model fits the one before it, in flight order."""
-    return [link for strip in result.model_strips for link in _links(result, strip)]
+    return Table.of_rows("links", (link for strip in result.model_strips for link in _links(result, strip)))
 
 
 def _links(result: Result, strip: StripResult) -> list[Document]:
@@ -97,10 +97,10 @@ def _links(result: Result, strip: StripResult) -> list[Document]:
             "limit": links.limit[number],
             "detectable_um": smallest[used].max() * 1000.0,
             "far_end": far[number],
-            "discrepancy": dict(zip(DIRECTIONS, size, strict=True)),
-            "discrepancy_um": dict(zip(DIRECTIONS, size / strip.scale_number * PPM, strict=True)),
+            **along_the_strip("discrepancy", size),
+            **along_the_strip("discrepancy_um", size / strip.scale_number * PPM),
         }
-        found.append(record("links", link))
+        found.append(link)
     return found
 
 
@@ -110,8 +110,8 @@ def names_of(result: Result, nodes: Numbers) -> list[str]:
     return [] if measured is None else [measured.points.name(int(node)) for node in nodes]
 
 
-def residuals_of(result: Result, rank: Numbers) -> Records:
-    """Return the list ``link_residuals``: differences of what neighbouring models have in common, link by link.
+def residuals_of(result: Result, rank: Numbers) -> Table:
+    """Return the table ``link_residuals``: differences of what neighbouring models have in common, link by link.
 
     After minus before, in micrometres along the axes of the model before; also of points that took no part.
     """
@@ -122,12 +122,13 @@ def residuals_of(result: Result, rank: Numbers) -> Records:
         place = np.concatenate([rank, len(rank) + np.arange(len(strip.strip.photos) + node.max(initial=0))])
         order = np.lexsort((place[node[shared.before]], shared.link))
         columns = {
-            "points": names_of(result, node[shared.before[order]]),
+            "strip": strip.strip.id,
+            "before": np.array(names[:-1], object)[shared.link[order]],
+            "after": np.array(names[1:], object)[shared.link[order]],
+            "point": names_of(result, node[shared.before[order]]),
             **{f"v{axis}_um": -1000.0 * links.solved.residual[order, k] for k, axis in enumerate(CARTESIAN_AXES)},
             "test": links.value[order],
             "used": links.used[order],
         }
-        heads = {"strip": strip.strip.id, "before": names[:-1], "after": names[1:]}
-        ends = np.searchsorted(shared.link[order], np.arange(shared.count + 1)).tolist()
-        found.append(grouped("link_residuals", heads, columns, ends))
-    return Records.joined(found)
+        found.append(Table.of("link_residuals", columns))
+    return Table.joined("link_residuals", found)

@@ -11,8 +11,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.numbers import order_of
-from photostrip.result.quantities import grouped, records
-from photostrip.result.records import Named, Records
+from photostrip.result.table import Table
 from photostrip.strip.formed_strip import base_angles
 from photostrip.strip.pair_screening import SEARCHES, tested
 from photostrip.strip.pair_screening import stages as tests_of
@@ -54,22 +53,23 @@ def sigma0(squares: Floats, redundancy: Numbers) -> float:
     return float(np.sqrt(squares.sum() / 2 / total)) if total > 0 else float("nan")
 
 
-def models_of(result: Result) -> Records:
-    """Return the list ``models``: relative orientation and scale of every pair, in flight order."""
+def models_of(result: Result) -> Table:
+    """Return the table ``models``: relative orientation and scale of every pair, in flight order."""
     ids = result.refined.observations.point_ids
-    return Records.joined(_models(strip, ids, result.settings.relative) for strip in result.photo_strips)
+    parts = (_models(strip, ids, result.settings.relative) for strip in result.photo_strips)
+    return Table.joined("models", parts)
 
 
-def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) -> Records:
+def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) -> Table:
     stages, photos, sums = strip.of_photos, strip.strip.photos, Parallaxes.of(strip)
     oriented, formed, used = stages.orientation, stages.formed, stages.orientation.points_used
     columns = {
         "strip": strip.strip.id,
         "left": photos[:-1],
         "right": photos[1:],
-        "elements": {"unit": "deg", **dict(zip(ELEMENTS, np.degrees(oriented.elements).T, strict=True))},
-        "photo_system": _in_left_photo(oriented),
-        "sigmas": {"unit": "deg", **dict(zip(ELEMENTS, np.degrees(oriented.sigmas).T, strict=True))},
+        **_of_elements("elements", oriented.elements),
+        **{f"photo_system_{key}": column for key, column in _in_left_photo(oriented).items()},
+        **_of_elements("sigmas", oriented.sigmas),
         "sigma0_um": 1000.0 * oriented.sigma0,
         "rms_parallax_um": 1000.0 * sums.rms,
         "max_parallax_um": 1000.0 * np.abs(oriented.parallax[sums.worst]),
@@ -77,7 +77,7 @@ def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) 
         "points_used": used,
         "points_rejected": np.bincount(oriented.pairs.pair, minlength=len(used)) - used,
         "redundancy": sums.redundancy,
-        "zones": stages.screened.counts,
+        **{f"zone_{k + 1}": column for k, column in enumerate(stages.screened.counts.T)},
         "detectable_um": 1000.0 * _detectable(strip),
         "limit_um": 1000.0 * _parallax_limits(stages, relative),
         "masked_errors_suspected": stages.screened.masked,
@@ -88,7 +88,11 @@ def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) 
         "base_direction_deg": np.degrees(formed.base_direction),
         "base_inclination_deg": np.degrees(formed.base_inclination),
     }
-    return records("models", columns)
+    return Table.of("models", columns)
+
+
+def _of_elements(name: str, values: Floats) -> dict[str, Floats]:
+    return {f"{name}_{element}": column for element, column in zip(ELEMENTS, np.degrees(values).T, strict=True)}
 
 
 def _in_left_photo(oriented: Orientation) -> dict[str, object]:
@@ -100,7 +104,6 @@ def _in_left_photo(oriented: Orientation) -> dict[str, object]:
     tau, nu = np.degrees(base_angles(base))
     angles = np.degrees(alpha_omega_kappa(rotation))
     return {
-        "unit": "deg",
         "by_bx": slopes[0],
         "bz_bx": slopes[1],
         "tau": tau,
@@ -117,24 +120,27 @@ def _detectable(strip: StripResult) -> Floats:
     return np.where(np.isfinite(worst), worst, np.nan)
 
 
-def parallaxes_of(result: Result, rank: Numbers) -> Records:
-    """Return the list ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
+def parallaxes_of(result: Result, rank: Numbers) -> Table:
+    """Return the table ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
     ids = result.refined.observations.point_ids
     found = []
     for strip in result.photo_strips:
         oriented, screened, photos = strip.of_photos.orientation, strip.of_photos.screened, strip.strip.photos
         order = order_of(oriented.pairs.pair, rank[oriented.point])
+        pair = oriented.pairs.pair[order]
         columns = {
-            "points": Named(ids, oriented.point[order]),
+            "strip": strip.strip.id,
+            "left": np.array(photos[:-1], object)[pair],
+            "right": np.array(photos[1:], object)[pair],
+            "point": np.array(ids, object)[oriented.point[order]],
             "q_um": 1000.0 * oriented.parallax[order],
             "used": oriented.used[order],
             "zone": screened.zone[order],
             "redundancy": np.where(oriented.used, oriented.redundancy, np.nan)[order],
             "detectable_um": 1000.0 * screened.detectable[order],
         }
-        heads = {"strip": strip.strip.id, "left": photos[:-1], "right": photos[1:]}
-        found.append(grouped("parallaxes", heads, columns, [*oriented.pairs.starts.tolist(), len(order)]))
-    return Records.joined(found)
+        found.append(Table.of("parallaxes", columns))
+    return Table.joined("parallaxes", found)
 
 
 def _parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:

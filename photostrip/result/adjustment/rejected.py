@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import repeat
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from photostrip.result.adjustment.bundle import GroupKind, kinds, names_of_obser
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Plain, natural, natural_rank, rounded
-from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
+from photostrip.result.quantities import DECIMALS_BY_UNIT
+from photostrip.result.table import Table
 from photostrip.strip.control_screening import EITHER, EXCHANGED
 from photostrip.strip.formed_strip import model_points
 from photostrip.strip.scale_transfer import depths
@@ -53,14 +55,21 @@ EMPTY: Document = {
 }
 
 
-def rejected_of(result: Result) -> list[Document]:
-    """Return the list ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
+def rejected_of(result: Result) -> Table:
+    """Return the table ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
 
     Within a pair, a junction or a link they stand in natural order of the points: the order of the tables does not
     show. A measurement that was taken back in the end is in it, marked. What a bundle adjustment took out comes last.
     """
+    rows = _rows(result)
+    if result.model_strips:
+        rows = [{**each, "models": each.get("models", [])} for each in rows]
+    return Table.of_rows("rejected", rows)
+
+
+def _rows(result: Result) -> list[Document]:
     observations = result.refined.observations
-    found = []
+    found: list[Document] = []
     for strip in result.strips:
         if strip.model_stages is None:
             found += _from_pairs(strip, observations)
@@ -76,12 +85,14 @@ def rejected_of(result: Result) -> list[Document]:
 
 
 def _entry(**values: object) -> Document:
-    return record("rejected", EMPTY | values)
+    return EMPTY | values
 
 
 def _entries(**columns: object) -> list[Document]:
     """Make entries of columns; a text, a flag or None stands in each."""
-    return list(records("rejected", EMPTY | columns))
+    size = next(len(column) for column in columns.values() if isinstance(column, list | np.ndarray))
+    listed = [column if isinstance(column, list | np.ndarray) else repeat(column, size) for column in columns.values()]
+    return [EMPTY | dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]
 
 
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
@@ -199,7 +210,7 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
         blamed=[[photos[place]] if every[place].cause == WRONG_RAY else [] for place in rays],
         reason=[REASONS[every[place].cause] for place in rays],
     )
-    entries = [entry if entry["size"] is not None else entry | {"size_unit": ""} for entry in entries]
+    entries = [entry if np.isfinite(entry["size"]) else entry | {"size_unit": ""} for entry in entries]
     found = dict(zip(rays, entries, strict=True))
     for place in sorted(set(range(len(every))) - found.keys()):
         found[place] = _from_control(strip, every[place], points[place], photos[place])
@@ -268,7 +279,6 @@ def _from_links(result: Result, strip: StripResult) -> list[Document]:
             f"{_other_point(strip, int(before), size)}; {wrong}",
             models=pair,
         )
-        del entry["blamed"]  # models have no rays
         found.append(entry)
     return found
 
@@ -295,7 +305,7 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     rows = []
     for each in rejected:
         photos = [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
-        photos = each.get("models", photos)
+        photos = each.get("models") or photos
         back = all((photo, each["point"]) in used for photo in photos) if photos else each["point"] in held
         rows.append(each | after_all if back else each)
     return rows

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -15,20 +13,22 @@ from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.adjustment import links, pairs
-from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
+from photostrip.result.adjustment.junctions import PPM, along_the_strip, discrepancies
 from photostrip.result.numbers import rms
-from photostrip.result.quantities import record
+from photostrip.result.quantities import MATRIX
+from photostrip.result.table import Table
 from photostrip.strip.polynomial import Polynomial
+from photostrip.strip.polynomial_terms import degree_of
 
 
 def strip_of(result: Result, strip: StripResult) -> Document:
-    """Return a record of ``strips``: what a strip is like and how well it holds together."""
+    """Return a row of ``strips``: what a strip is like and how well it holds together."""
     of_photos = strip.model_stages is None
     formed = strip.of_photos.formed.junctions if of_photos else strip.of_models.formed.links
     gap = discrepancies(strip)[formed.used]  # rms() passes over points left out for their rays
     base = np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)
     base = base[np.isfinite(base)]
-    values = {
+    return {
         "id": strip.strip.id,
         "camera": strip.of_photos.strip.camera.name if of_photos else None,
         "photos": len(strip.strip.photos),
@@ -40,14 +40,12 @@ def strip_of(result: Result, strip: StripResult) -> Document:
         "base": base.mean() if len(base) else np.nan,
         "azimuth_deg": np.degrees(strip.intermediate.azimuth) % 360,
         **(_fit_of_photos(result, strip) if of_photos else _fit_of_models(strip)),
-        "precision": dict(zip(("plan", "height"), strip.precision, strict=True)),
-        "discrepancy": {name: rms(column) for name, column in zip(DIRECTIONS, gap.T, strict=True)},
-        "scale_drift": {
-            "expected_ppm": (_expected_drift(strip) if of_photos else links.expected_drift(strip)) * PPM,
-            "found_ppm": _found_drift(strip) * PPM if of_photos else None,
-        },
+        "precision_plan": strip.precision.plan,
+        "precision_height": strip.precision.height,
+        **along_the_strip("discrepancy", np.array([rms(column) for column in gap.T])),
+        "scale_drift_expected_ppm": (_expected_drift(strip) if of_photos else links.expected_drift(strip)) * PPM,
+        "scale_drift_found_ppm": _found_drift(strip) * PPM if of_photos else None,
     }
-    return record("strips", values)
 
 
 def _fit_of_photos(result: Result, strip: StripResult) -> Document:
@@ -100,63 +98,86 @@ def _scale_change(correction: Polynomial, x: float) -> float:
 
 
 def absolute_of(strip: StripResult) -> Document:
-    """Return a record of ``absolute``: the similarity of a strip to its control."""
+    """Return a row of ``absolute``: the similarity of a strip to its control."""
     found, use = strip.absolute, strip.control.use
     misclosures = [rms(column) for column in np.where(use, found.misclosures, np.nan).T]
-    values = {
+    return {
         "strip": strip.strip.id,
-        "control": {"points": len(strip.control), "plan": int(use[:, 0].sum()), "height": int(use[:, 2].sum())},
+        "control_points": len(strip.control),
+        "control_plan": int(use[:, 0].sum()),
+        "control_height": int(use[:, 2].sum()),
         "scale": found.similarity.scale,
-        "rotation": found.similarity.rotation.ravel(),
-        "angles_deg": _angles(found.similarity.rotation),
-        "shift": found.similarity.shift,
-        "origin": strip.intermediate.origin,
-        "axes": strip.intermediate.axes.ravel(),
+        **dict(zip(MATRIX, found.similarity.rotation.ravel(), strict=True)),
+        **_angles(found.similarity.rotation),
+        **{f"shift_{axis}": value for axis, value in zip(CARTESIAN_AXES, found.similarity.shift, strict=True)},
+        **{f"origin_{axis}": value for axis, value in zip(CARTESIAN_AXES, strip.intermediate.origin, strict=True)},
+        **{name.replace("r", "a"): value for name, value in zip(MATRIX, strip.intermediate.axes.ravel(), strict=True)},
         "sigma0": found.sigma0,
         "redundancy": found.redundancy,
         "condition": found.condition,
         "iterations": found.iterations,
-        "misclosure_rms": dict(zip(GROUND_AXES, misclosures, strict=True)),
+        **{f"misclosure_rms_{axis}": value for axis, value in zip(GROUND_AXES, misclosures, strict=True)},
     }
-    return record("absolute", values)
 
 
-def _angles(rotation: Floats) -> Document | None:
+def _angles(rotation: Floats) -> Document:
+    names = ("angles_deg_alpha", "angles_deg_omega", "angles_deg_kappa")
     try:
-        values = alpha_omega_kappa(rotation)
+        return dict(zip(names, np.degrees(alpha_omega_kappa(rotation)), strict=True))
     except GeometryError:
-        return None
-    return dict(zip(("alpha", "omega", "kappa"), np.degrees(values), strict=True))
+        return dict.fromkeys(names)
 
 
 def polynomials_of(result: Result) -> Document:
-    """Return the list ``polynomials`` under its key: the correction of every strip that has one; empty without any."""
-    found = [_polynomial(strip.strip.id, strip.polynomial) for strip in result.strips if strip.polynomial is not None]
-    return {"polynomials": found} if found else {}
+    """Return what the correction of every strip is that has one, its terms and the evidence for its degree."""
+    strips = [(strip.strip.id, strip.polynomial) for strip in result.strips if strip.polynomial is not None]
+    if not strips:
+        return {}
+    return {
+        "polynomials": Table.of_rows("polynomials", (_polynomial(strip, found) for strip, found in strips)),
+        "polynomial_terms": Table.joined("polynomial_terms", (_terms(strip, found) for strip, found in strips)),
+        "polynomial_evidence": Table.of_rows(
+            "polynomial_evidence",
+            ({"strip": strip, **asdict(step)} for strip, found in strips for step in found.evidence),
+        ),
+    }
 
 
 def _polynomial(strip: str, found: Polynomial) -> Document:
-    axes = found.axes
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = [axis.coefficients / axis.sigmas for axis in axes]
-    values = {
+    plan, _, height = (degree_of(axis.terms) for axis in found.axes)
+    values: Document = {
         "strip": strip,
         "degree": found.degree,
         "asked": found.asked,
-        "terms": _by_axis([list(axis.terms) for axis in axes]),
-        "coefficients": _by_axis([axis.coefficients for axis in axes]),
-        "sigmas": _by_axis([axis.sigmas for axis in axes]),
-        "t": _by_axis(ratios),
-        "effects": _by_axis([axis.effects for axis in axes]),
-        "sigma0": _by_axis([axis.sigma0 for axis in axes]),
-        "redundancy": _by_axis([axis.redundancy for axis in axes]),
-        "condition": _by_axis([axis.condition for axis in axes]),
-        "stations": dict(zip(("plan", "height"), found.stations, strict=True)),
-        "reach": np.array(found.reach),
-        "evidence": [asdict(step) for step in found.evidence],
+        "reach_from": found.reach[0],
+        "reach_to": found.reach[1],
+        "degree_plan": plan,
+        "degree_height": height,
+        "stations_plan": found.stations[0],
+        "stations_height": found.stations[1],
     }
-    return record("polynomials", values)
+    for name, axis in zip(CARTESIAN_AXES, found.axes, strict=True):
+        values |= {
+            f"sigma0_{name}": axis.sigma0,
+            f"redundancy_{name}": axis.redundancy,
+            f"condition_{name}": axis.condition,
+        }
+    return values
 
 
-def _by_axis(values: Sequence[Any]) -> Document:
-    return dict(zip(CARTESIAN_AXES, values, strict=True))
+def _terms(strip: str, found: Polynomial) -> Table:
+    parts = []
+    for name, axis in zip(CARTESIAN_AXES, found.axes, strict=True):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = axis.coefficients / axis.sigmas
+        columns = {
+            "strip": strip,
+            "axis": name,
+            "term": list(axis.terms),
+            "coefficient": axis.coefficients,
+            "sigma": axis.sigmas,
+            "t": ratio,
+            "effect": axis.effects,
+        }
+        parts.append(Table.of("polynomial_terms", columns))
+    return Table.joined("polynomial_terms", parts)

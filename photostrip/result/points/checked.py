@@ -7,7 +7,7 @@ residual. A third photo, a second model or given coordinates check that too.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.points import locate
 from photostrip.rejection import UNCONTROLLED
-from photostrip.result.records import Records, column_of
+from photostrip.result.table import Table
 
 CHECKED = NONE, ACROSS, ALONG = "none", "across", "along"
 
@@ -66,22 +66,21 @@ def _of_strips(result: Result, models: Numbers) -> Numbers:
     return np.where(along, 2, across[numbers].astype(np.intp))
 
 
-def counts_of(points: Records) -> Document:
+def counts_of(points: Table) -> Document:
     """Count the points by how they are checked, best first."""
-    number = Counter(column_of(points, "checked"))
+    number = Counter(points.values("checked"))
     return {"points_checked": {name: number[name] for name in reversed(CHECKED)}}
 
 
-def unchecked_notes(points: Records, rejected: Iterable[Document], measured: int) -> Iterator[Note]:
+def unchecked_notes(points: Table, rejected: Table, measured: int) -> Iterator[Note]:
     """Say what may be left in points that nothing checks along the base, where as many rays were found wrong.
 
-    rejected: the list ``rejected`` of the document.
+    rejected: the table ``rejected`` of the document.
     measured: number of all image points.
     """
     wrong = {each["point"] for each in rejected if each["photo"] is not None and not each["readmitted"]}
     share, number = len(wrong) / max(measured, 1), counts_of(points)["points_checked"]
-    rays = zip(column_of(points, "rays"), column_of(points, "checked"), strict=True)
-    if share * sum(int(count) for count, checked in rays if checked != ALONG) < 1.0:
+    if share * points["rays"][points["checked"] != ALONG].sum() < 1.0:
         return
     text = (
         f"rays of {counted(len(wrong), 'point')} were found wrong, {100 * share:.1f} % of all rays; "

@@ -16,7 +16,8 @@ from photostrip.result.points.given import PARTS, differences, size_columns
 from photostrip.result.points.own_precision import chances
 from photostrip.result.points.precision import INSIDE, point_columns
 from photostrip.result.points.standing_out import stand_out
-from photostrip.result.quantities import record, records
+from photostrip.result.quantities import record
+from photostrip.result.table import Table
 
 LEAST = 1e-300  # probability below which it is all the same
 Columns = dict[str, list[object]]
@@ -44,12 +45,13 @@ def cross_validation_of(result: Result) -> Document:
     known = [fold["p"] for fold in folds if fold["p"] is not None]
     summed = {} if not columns else _summed(columns)
     block = {
-        "folds": folds,
+        "folds": Table.of_rows("cross_validation.folds", folds),
         "p": len(known) / sum(1 / max(chance, LEAST) for chance in known) if known else None,
         **{part: summed.get(part, dict.fromkeys(("count", "rms", "rms_um", "inside_95", "ratio"))) for part in PARTS},
     }
-    rows = sorted(records("cross_validation.points", columns) if columns else (), key=lambda row: natural(row["id"]))
-    return {"cross_validation": record("cross_validation", block) | {"points": rows}}
+    points = Table.of("cross_validation.points", columns) if columns else Table.of_rows("cross_validation.points", ())
+    order = sorted(range(len(points)), key=lambda row: natural(points["id"][row]))
+    return {"cross_validation": record("cross_validation", block | {"points": points[order]})}
 
 
 def _joint(result: Result) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from math import erfc, sqrt
 
 import numpy as np
@@ -18,12 +19,11 @@ from photostrip.points import locate, located
 from photostrip.result.numbers import natural_rank
 from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
-from photostrip.result.quantities import records
-from photostrip.result.records import Grouped, Named, Records
+from photostrip.result.table import Table
 
 PARTS = "plan", "height"
 COUNTED = "x", "y", "xy", "z", "xz", "yz", "xyz"  # words of the project file for the coordinates that count
-PLACES = np.array([1, 2, 4], np.int8)  # what each coordinate adds to the place of the word, counted from 1
+PLACES = np.array([1, 2, 4])  # what each coordinate adds to the place of the word, counted from 1
 CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
 
@@ -192,30 +192,30 @@ def _expected(result: Result, held: Flags) -> Floats:
     return np.asarray(sigma, float)
 
 
-def control_of(result: Result, found: Differences) -> Records:
+def control_of(result: Result, found: Differences) -> Table:
     """Return the list ``control``: every given point with what is left there, in natural order of the ids."""
     control = result.inputs.control
     order = np.argsort(natural_rank(control.ids))
     columns = {
-        "id": Named(control.ids, order),
-        "role": Named(("control", "check"), control.check[order].astype(np.int8)),
-        "use": Named(("off", *COUNTED), control.use[order] @ PLACES),
-        "rejected": Named(("", *COUNTED), found.rejected[order] @ PLACES),
+        "id": np.array(control.ids, object)[order],
+        "role": np.where(control.check[order], "check", "control").astype(object),
+        "use": np.array(("off", *COUNTED), object)[control.use[order] @ PLACES],
+        "rejected": np.array(("", *COUNTED), object)[found.rejected[order] @ PLACES],
         "measured": result.control_rows[order] >= 0,
         **size_columns(found.axes[order], found.plan[order], found.height[order], found.scale[order]),
-        "sigma": _in_list_order(result, control.sigma)[order],
-        "sigma_fit": _in_list_order(result, found.sigma)[order],
+        **{f"sigma_{k + 1}": column for k, column in enumerate(_in_list_order(result, control.sigma)[order].T)},
+        **{f"sigma_fit_{k + 1}": column for k, column in enumerate(_in_list_order(result, found.sigma)[order].T)},
         "normalised": found.normalised[order],
         "stands_out": _chosen(PARTS, found.stands_out[order]),
         "list": control.frame[order] + 1,
         "strips": _chosen([strip.strip.id for strip in result.strips], found.held.T[order]),
     }
-    return records("control", columns)
+    return Table.of("control", columns)
 
 
-def _chosen(names: Sequence[str], chosen: Flags) -> Grouped:
+def _chosen(names: Sequence[str], chosen: Flags) -> list[list[str]]:
     """Return for each row the names that are chosen in it."""
-    return Grouped(Named(names, np.nonzero(chosen)[1]), [0, *np.cumsum(chosen.sum(axis=1)).tolist()])
+    return [list(compress(names, row)) for row in chosen.tolist()]
 
 
 def _in_list_order(result: Result, enu: Floats) -> Floats:
@@ -238,7 +238,7 @@ def size_columns(axes: Floats, plan: Floats, height: Floats, scale: Floats) -> D
     }
 
 
-def misclosures_of(result: Result) -> Records:
+def misclosures_of(result: Result) -> Table:
     """Return the list ``misclosures``: strip minus control after the similarity, before any polynomial.
 
     Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
@@ -258,9 +258,9 @@ def misclosures_of(result: Result) -> Records:
             "strip": strip.strip.id,
             "id": list(strip.control.ids),
             **dict(zip(GROUND_AXES, misclosures.T, strict=True)),
-            "redundancy": dict(zip(GROUND_AXES, redundancy.T, strict=True)),
-            "detectable": dict(zip(GROUND_AXES, detectable.T, strict=True)),
-            "leverage": dict(zip("xyz", leverage, strict=True)),
+            **{f"redundancy_{axis}": column for axis, column in zip(GROUND_AXES, redundancy.T, strict=True)},
+            **{f"detectable_{axis}": column for axis, column in zip(GROUND_AXES, detectable.T, strict=True)},
+            **{f"leverage_{axis}": column for axis, column in zip("xyz", leverage, strict=True)},
         }
-        found.append(records("misclosures", columns).taken(np.argsort(natural_rank(strip.control.ids))))
-    return Records.joined(found)
+        found.append(Table.of("misclosures", columns)[np.argsort(natural_rank(strip.control.ids))])
+    return Table.joined("misclosures", found)

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Document
 from photostrip.pipeline.results import ROLES, Result
-from photostrip.result.numbers import GROUND, RoundedColumn, natural_rank, to_decimals
+from photostrip.result.numbers import GROUND, natural_rank, to_decimals
 from photostrip.result.points.checked import CHECKED, checked_of
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
-from photostrip.result.quantities import coordinate_decimals, records
-from photostrip.result.records import Named, Records
+from photostrip.result.quantities import coordinate_decimals
+from photostrip.result.table import Table
 
 KEPT = 1e-3  # of a pixel on the ground that the coordinates of a free network show
 
 
 def coordinates(result: Result, enu: Floats) -> Document:
     """Return the columns x, y, z of coordinates in the internal order, with the decimals of their frame."""
-    frame = result.output
-    decimals = coordinate_decimals(frame.kind, frame.axes, ground_decimals(result))
-    columns = zip("xyz", frame.order, decimals, strict=True)
-    return {axis: RoundedColumn(to_decimals(enu[:, k], count)) for axis, k, count in columns}
+    columns = zip("xyz", result.output.order, coordinate_decimals(frame_of(result)), strict=True)
+    return {axis: to_decimals(enu[:, k], count) for axis, k, count in columns}
 
 
 def ground_decimals(result: Result) -> int:
@@ -61,7 +58,7 @@ def frame_of(result: Result) -> Document:
     }
 
 
-def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
+def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Table:
     """Return the list ``points``, in natural order of their ids.
 
     image_rms: (n,), root mean square image residual of each point as numbered in the observations, mm.
@@ -72,23 +69,21 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
     for strip in result.strips:
         models[strip.formed.point] += strip.formed.model_count
     columns = {
-        "id": Named(ids, points.number),
-        "role": Named(ROLES, result.roles.astype(np.int8)),
+        "id": np.array(ids, object)[points.number],
+        "role": np.array(ROLES, object)[result.roles],
         **coordinates(result, points.ground),
         **point_columns(result),
         "rays": points.rays,
         "models": models[points.number],
-        "checked": Named(CHECKED, checked_of(result, models[points.number]).astype(np.int8)),
+        "checked": np.array(CHECKED, object)[checked_of(result, models[points.number])],
         "image_rms_um": image_rms[points.number] * 1000.0,
     }
-    return records("points", columns).taken(np.argsort(rank[points.number]))
+    return Table.of("points", columns)[np.argsort(rank[points.number])]
 
 
-def ties_of(result: Result, rank: Numbers) -> Sequence[Document]:
+def ties_of(result: Result, rank: Numbers) -> Table:
     """Return the list ``ties``: points of two strips with their differences, second minus first."""
     ties, ids = result.ties, result.refined.observations.point_ids
-    if not len(ties.number):
-        return []
     names = [strip.strip.id for strip in result.strips]
     scale = np.array([strip.scale_number for strip in result.strips])[ties.strips].mean(axis=1)
     level, axes = _level_ties(result), result.output.user_from_internal(ties.difference)
@@ -97,7 +92,7 @@ def ties_of(result: Result, rank: Numbers) -> Sequence[Document]:
         "strips": [[names[first], names[second]] for first, second in ties.strips],
         **size_columns(axes, np.hypot(level[:, 0], level[:, 1]), level[:, 2], scale),
     }
-    return records("ties", columns).taken(np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number])))
+    return Table.of("ties", columns)[np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number]))]
 
 
 def _level_ties(result: Result) -> Floats:
@@ -109,7 +104,8 @@ def _level_ties(result: Result) -> Floats:
     return level
 
 
-def not_determined_of(result: Result) -> list[Document]:
+def not_determined_of(result: Result) -> Table:
     """Return the list ``not_determined``: measured points without coordinates, and why."""
     names = tuple(result.not_determined)
-    return [{"id": names[row], "reason": result.not_determined[names[row]]} for row in np.argsort(natural_rank(names))]
+    order = [names[row] for row in np.argsort(natural_rank(names))]
+    return Table.of("not_determined", {"id": order, "reason": [result.not_determined[name] for name in order]})

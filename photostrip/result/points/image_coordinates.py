@@ -7,18 +7,17 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
-from photostrip.result.numbers import EXACT, RoundedColumn, natural_rank, order_of, significant
-from photostrip.result.quantities import grouped
-from photostrip.result.records import Named, Records
+from photostrip.result.numbers import EXACT, natural_rank, order_of, significant
+from photostrip.result.table import Table
 from photostrip.units import MICROMETRES
 
 
 def fiducials_of(result: Result) -> Document:
-    """Return the list ``fiducials`` under its key: the interior orientation of each photo; nothing without marks."""
+    """Return the interior orientation of each photo, and the residuals of its marks; nothing without marks."""
     found = result.interior
     if found is None or not found.photo_ids:
         return {}
-    heads = {
+    photos = {
         "photo": list(found.photo_ids),
         "transform": list(found.transforms),
         "coefficients": significant(found.photo_from_measured.coefficients, EXACT),
@@ -29,19 +28,20 @@ def fiducials_of(result: Result) -> Document:
         "rotation_deg": np.degrees(found.rotation),
         "shear_deg": np.degrees(found.shear),
         "mirrored": found.mirrored,
+        "marks": list(map(len, found.marks)),
     }
     residuals = np.concatenate(found.residuals) * MICROMETRES
-    of_marks = {
-        "marks": [mark for marks in found.marks for mark in marks],
+    marks = {
+        "photo": np.repeat(np.array(found.photo_ids, object), photos["marks"]),
+        "mark": [mark for marks in found.marks for mark in marks],
         "vx_um": residuals[:, 0],
         "vy_um": residuals[:, 1],
     }
-    ends = np.cumsum([0, *map(len, found.marks)]).tolist()
-    return {"fiducials": list(grouped("fiducials", heads, of_marks, ends))}
+    return {"fiducials": Table.of("fiducials", photos), "fiducial_marks": Table.of("fiducial_marks", marks)}
 
 
-def refined_rows(result: Result) -> Records:
-    """Return the rows of refined.csv, photos in flight order and points in natural order; of models there are none.
+def refined_table(result: Result) -> Table:
+    """Return the table of refined.csv, photos in flight order and points in natural order; of models there are none.
 
     The coordinates are those that the adjustment takes, corrected by a
     calibration where a bundle has found one.
@@ -52,11 +52,11 @@ def refined_rows(result: Result) -> Records:
     rows = order_of(order[found.photo], natural_rank(found.point_ids)[found.point])
     sigma: Floats = found.sigma[rows] * MICROMETRES
     columns = {
-        "photo": Named(found.photo_ids, found.photo[rows]),
-        "point": Named(found.point_ids, found.point[rows]),
-        "x_mm": RoundedColumn(found.xy[rows, 0]),
-        "y_mm": RoundedColumn(found.xy[rows, 1]),
-        "sigma_x_um": RoundedColumn(sigma[:, 0]),
-        "sigma_y_um": RoundedColumn(sigma[:, 1]),
+        "photo": np.array(found.photo_ids, object)[found.photo[rows]],
+        "point": np.array(found.point_ids, object)[found.point[rows]],
+        "x_mm": found.xy[rows, 0],
+        "y_mm": found.xy[rows, 1],
+        "sigma_x_um": sigma[:, 0],
+        "sigma_y_um": sigma[:, 1],
     }
-    return Records(columns)
+    return Table.of("refined", columns)

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from photostrip.notes import Document, Note, named
+from photostrip.notes import Note, named
 from photostrip.pipeline.results import Result
 from photostrip.result.numbers import natural_rank
 from photostrip.result.points.photos import ImageResiduals
+from photostrip.result.table import Table
 from photostrip.units import MICROMETRES
 
 FAR = 5.0  # stated standard deviations; a sound coordinate is as far off once in two million
@@ -20,13 +21,13 @@ Images = dict[str, dict[str, tuple[str, ...]]]  # of points: what is said of the
 
 
 def lost_say_notes(
-    result: Result, residuals: Sequence[ImageResiduals], rejected: Iterable[Document], said: Iterable[Note]
+    result: Result, residuals: Sequence[ImageResiduals], rejected: Table, said: Iterable[Note]
 ) -> Iterator[Note]:
     """Name given points without coordinates, rejected images of the others, then images in use that do not fit.
 
     What ``use: off`` switches off, and what no photo shows, never had a say.
 
-    rejected: the list ``rejected`` of the document.
+    rejected: the table ``rejected`` of the document.
     said: the notes of the run.
     """
     control = result.inputs.control
@@ -53,14 +54,14 @@ def _lost(role: str, lost: dict[str, str]) -> Iterator[Note]:
         yield Note("check-lost" if ROLES[role] else "control-lost", "; ".join(texts), points=tuple(lost))
 
 
-def _rejected(rejected: Iterable[Document], *, in_bundle: bool) -> Images:
+def _rejected(rejected: Table, *, in_bundle: bool) -> Images:
     """Return the images that stay rejected; a bundle decides on each of them again."""
     found: Images = {}
     for each in rejected:
         if each["photo"] is None or each["readmitted"] or (in_bundle and each["stage"] != "bundle"):
             continue
         photos = each.get("blamed") or [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
-        where = f"models {' and '.join(each['models'])}" if "models" in each else f"photo {' or '.join(photos)}"
+        where = f"models {' and '.join(each['models'])}" if each.get("models") else f"photo {' or '.join(photos)}"
         found.setdefault(each["point"], {})[where] = tuple(photos)
     return found
 

@@ -13,12 +13,14 @@ from photostrip.geometry.rotation import angles
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.result.numbers import PER_RADIAN, Plain, RoundedColumn, order_of, to_decimals
+from photostrip.result.numbers import PER_RADIAN, order_of, to_decimals
 from photostrip.result.points.ground import coordinates
-from photostrip.result.points.precision import centre_columns, photo_columns
-from photostrip.result.quantities import angle_decimals, grouped, records
-from photostrip.result.records import Named, Records
+from photostrip.result.points.precision import COVARIANCES, SIGMAS, centre_columns, photo_columns
+from photostrip.result.quantities import MATRIX, angle_decimals
+from photostrip.result.table import Table
 from photostrip.strip.resection import depths, project
+
+ANGLES = ("angle_1", "angle_2", "angle_3")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,20 +88,20 @@ def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
     return found
 
 
-def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Records:
-    """Return the list ``residuals``: image residuals photo by photo, points in natural order."""
-    observations, found = result.refined.observations, []
+def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Table:
+    """Return the table ``residuals``: image residuals photo by photo, points in natural order."""
+    observations, parts = result.refined.observations, []
     for image in images:
         columns = {
-            "points": Named(observations.point_ids, observations.point[image.rows]),
+            "strip": image.strip.id,
+            "photo": np.array(image.strip.photos, object)[image.photo],
+            "point": np.array(observations.point_ids, object)[observations.point[image.rows]],
             "vx_um": 1000.0 * image.residuals[:, 0],
             "vy_um": 1000.0 * image.residuals[:, 1],
             "used": image.used,
         }
-        photos = image.strip.photos
-        ends = np.searchsorted(image.photo, np.arange(len(photos) + 1)).tolist()
-        found.append(grouped("residuals", {"strip": image.strip.id, "photo": photos}, columns, ends))
-    return Records.joined(found)
+        parts.append(Table.of("residuals", columns))
+    return Table.joined("residuals", parts)
 
 
 def ground_sample_distance(images: Sequence[ImageResiduals]) -> Document:
@@ -131,36 +133,46 @@ def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
         return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
 
 
-def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Records | list[Document]:
-    """Return the list ``photos``: exterior orientations in the frame of the result, in flight order.
+def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Document:
+    """Return the tables ``photos``, exterior orientations in the frame of the result, and ``covariances`` of these.
 
-    Of photos whose strip is made of independent models the perspective centre alone is known.
+    They stand in flight order. Of photos whose strip is made of independent models the perspective centre alone is
+    known.
     """
     if result.model_strips:
-        return [photo for number, strip in enumerate(result.strips) for photo in _centres(result, number, strip)]
-    of_strips = zip(result.photo_strips, images, strict=False)
-    found = [_photos_of_strip(result, number, strip, image) for number, (strip, image) in enumerate(of_strips)]
-    return Records.joined([*found, *_single_photos(result, images[len(result.photo_strips) :])])
+        parts = [_centres(result, number, strip) for number, strip in enumerate(result.strips)]
+    else:
+        of_strips = zip(result.photo_strips, images, strict=False)
+        parts = [_photos_of_strip(result, number, strip, image) for number, (strip, image) in enumerate(of_strips)]
+        parts += _single_photos(result, images[len(result.photo_strips) :])
+    photos = [{key: column for key, column in part.items() if key not in COVARIANCES} for part in parts]
+    found = {"photos": Table.joined("photos", (Table.of("photos", part) for part in photos))}
+    if not all("c11" in part for part in parts):
+        return found
+    known = [{"photo": part["id"], **{key: part[key] for key in COVARIANCES}} for part in parts]
+    return found | {"covariances": Table.joined("covariances", (Table.of("covariances", part) for part in known))}
 
 
-def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Records:
+def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Document:
     photos, resection = strip.strip.photos, strip.of_photos.resection
     centers = strip.intermediate.cartesian_from_intermediate(resection.centers)
     ground = result.output.ground_from_cartesian(centers, ids=[f"at the center of photo {photo}" for photo in photos])
     axes = result.output.axes_at(centers, ground)
     rotations = axes @ strip.intermediate.cartesian_rotations(resection.rotations)
     known = result.precision
-    columns = {
+    return {
+        "id": photos,
+        "strip": strip.strip.id,
+        **coordinates(result, ground),
+        **_turned(result, rotations),
+        **(dict.fromkeys(SIGMAS) if known is None else photo_columns(result, axes, rotations, known.photos[number])),
         "image_rms_um": 1000.0 * resection.rms,
         "points": np.bincount(image.photo[image.used], minlength=len(photos)),
         "resected": resection.solved,
     }
-    sigmas = {"sigma": None} if known is None else photo_columns(result, axes, rotations, known.photos[number])
-    head = {"id": photos, "strip": strip.strip.id, **coordinates(result, ground)}
-    return records("photos", head | _turned(result, rotations) | sigmas | columns)
 
 
-def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Records]:
+def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
     if result.bundle is None or not images:
         return []
     singles = result.bundle.singles
@@ -171,6 +183,11 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Rec
     ground = result.output.ground_from_cartesian(centers, ids=[f"of photo {photo}" for photo in photos])
     rows = [result.bundle.start.photos.index(photo) for photo in photos]
     columns = {
+        "id": photos,
+        "strip": [single.strip.id for single in singles],
+        **coordinates(result, ground),
+        **_turned(result, rotations),
+        **photo_columns(result, axes, rotations, result.bundle.photo_covariances[rows]),
         "image_rms_um": [
             1000.0 * np.sqrt(np.mean(image.residuals[image.used] ** 2)) if image.used.any() else None
             for image in images
@@ -178,28 +195,26 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Rec
         "points": [int(image.used.sum()) for image in images],
         "resected": True,
     }
-    head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result, ground)}
-    sigmas = photo_columns(result, axes, rotations, result.bundle.photo_covariances[rows])
-    return [records("photos", head | _turned(result, rotations) | sigmas | columns)]
+    return [columns]
 
 
 def _turned(result: Result, rotations: Floats) -> Document:
     system, unit = result.settings.angle_system, result.settings.angle_unit
-    values = _angles(rotations, system, unit)
-    return {"rotation": rotations.reshape(-1, 9), "angles": {"system": system, "unit": unit, "values": values}}
+    values = to_decimals(_angles(rotations, system) * PER_RADIAN[unit], angle_decimals(unit))
+    return {**dict(zip(MATRIX, rotations.reshape(-1, 9).T, strict=True)), **dict(zip(ANGLES, values.T, strict=True))}
 
 
-def _angles(rotations: Floats, system: str, unit: str) -> Sequence[Plain]:
-    """Angles in the unit of the output; None for a photo whose outer two angles cannot be separated."""
+def _angles(rotations: Floats, system: str) -> Floats:
+    """Angles in radians, shape (n, 3); NaN for a photo whose outer two angles cannot be separated."""
     try:
-        return RoundedColumn(to_decimals(angles(rotations, system) * PER_RADIAN[unit], angle_decimals(unit)))
+        return angles(rotations, system)
     except GeometryError:
         if len(rotations) == 1:
-            return [None]
-        return [_angles(rotation[None], system, unit)[0] for rotation in rotations]
+            return np.full((1, 3), np.nan)
+        return np.concatenate([_angles(rotation[None], system) for rotation in rotations])
 
 
-def _centres(result: Result, number: int, strip: StripResult) -> list[Document]:
+def _centres(result: Result, number: int, strip: StripResult) -> Document:
     """Return the perspective centres of a strip of independent models, as far as they are known."""
     photos, models = strip.strip.photos, strip.of_models.formed.models
     known = np.flatnonzero(np.isfinite(strip.centers).all(axis=1))
@@ -207,25 +222,20 @@ def _centres(result: Result, number: int, strip: StripResult) -> list[Document]:
     names = [f"at the center of photo {photos[row]}" for row in known.tolist()]
     places = coordinates(result, result.output.ground_from_cartesian(centers, ids=names))
     covariances = None if result.precision is None else result.precision.photos[number][known]
-    columns = {"id": [photos[row] for row in known], **places, **centre_columns(result, centers, covariances)}
-    of_centre = {row["id"]: row for row in records("photos", columns)} if len(known) else {}
+    of_known = places | centre_columns(result, centers, covariances)
     used = (models.node < models.points) & strip.of_models.formed.used
-    count = np.bincount(models.model[used], minlength=models.count).tolist()
-    system, unit = result.settings.angle_system, result.settings.angle_unit
-    found = []
-    for row, photo in enumerate(photos):
-        centre = of_centre.get(photo, {"x": None, "y": None, "z": None, "sigma": None})
-        found.append(
-            {
-                "id": photo,
-                "strip": strip.strip.id,
-                **{axis: centre.pop(axis) for axis in "xyz"},
-                "rotation": None,
-                "angles": {"system": system, "unit": unit, "values": None},
-                **{key: value for key, value in centre.items() if key != "id"},
-                "image_rms_um": None,
-                "points": max(count[max(row - 1, 0) : row + 1]),
-                "resected": None,
-            }
-        )
+    count = np.bincount(models.model[used], minlength=models.count)
+    return {
+        "id": photos,
+        "strip": strip.strip.id,
+        **{key: _at_rows(column, known, len(photos)) for key, column in of_known.items()},
+        **dict.fromkeys((*MATRIX, *ANGLES, "image_rms_um", "resected")),
+        "points": np.maximum(np.append(count, 0), np.append(0, count)),
+    }
+
+
+def _at_rows(column: Floats | None, rows: Numbers, size: int) -> Floats:
+    found = np.full(size, np.nan)
+    if column is not None:
+        found[rows] = column
     return found

@@ -14,12 +14,14 @@ from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.given import Differences
 from photostrip.result.points.own_precision import chances, turned
-from photostrip.result.quantities import record, records
-from photostrip.result.records import Records
+from photostrip.result.quantities import record
+from photostrip.result.table import Table
 from photostrip.statistics import chi2_quantile, normal_quantile, squares_p_value
 from photostrip.strip.fitted_strip import CheckErrors
 
 ROWS, COLUMNS = np.triu_indices(6)
+COVARIANCES = tuple(f"c{row + 1}{column + 1}" for row, column in zip(ROWS.tolist(), COLUMNS.tolist(), strict=True))
+SIGMAS = ("sigma_x", "sigma_y", "sigma_z", "sigma_angle_1", "sigma_angle_2", "sigma_angle_3")
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(1 - OUTSIDE, 2))), "height": normal_quantile(1 - OUTSIDE / 2)}
 
@@ -77,8 +79,8 @@ def photo_columns(result: Result, axes: Floats, rotations: Floats, given: Floats
     axes, rotations: (m, 3, 3), axes of the output at the perspective centres, rows in the Cartesian frame; photo to
         those axes.
     given: (m, 6, 6), covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
-    Returns ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle,
-        row by row, of the matrix of x, y, z and the three angles.
+    Returns standard deviations of x, y, z in metres and of the angles in their exported unit; the upper triangle of the
+        covariances of x, y, z and the three angles.
     """
     turn = np.zeros((len(axes), 6, 6))
     turn[:, :3, :3] = axes[:, list(result.output.order)]
@@ -86,18 +88,20 @@ def photo_columns(result: Result, axes: Floats, rotations: Floats, given: Floats
     covariances = turn @ given @ turn.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    of_centre = dict(zip("xyz", sigma.T[:3], strict=True))
-    return {"sigma": {**of_centre, "angles": sigma[:, 3:]}, "covariance": covariances[:, ROWS, COLUMNS]}
+    return dict(zip(SIGMAS, sigma.T, strict=True)) | _upper(covariances)
 
 
 def centre_columns(result: Result, place: Floats, given: Floats | None) -> Document:
     """Return the same of perspective centres alone: nothing is known of the angles."""
     if given is None:
-        return {"sigma": None}
+        return dict.fromkeys(SIGMAS)
     covariances = np.full((len(place), 6, 6), np.nan)
     covariances[:, :3, :3] = turned(given[:, :3, :3], result.output.axes_at(place)[:, list(result.output.order)])
-    sigma = dict(zip("xyz", np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3]).T, strict=True))
-    return {"sigma": {**sigma, "angles": None}, "covariance": covariances[:, ROWS, COLUMNS]}
+    return dict(zip(SIGMAS, np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)).T, strict=True)) | _upper(covariances)
+
+
+def _upper(covariances: Floats) -> Document:
+    return dict(zip(COVARIANCES, covariances[:, ROWS, COLUMNS].T, strict=True))
 
 
 def _rates(rotations: Floats, system: str) -> Floats:
@@ -124,15 +128,19 @@ def precision_of(result: Result, found: Differences) -> Document:
         return {}
     sigma = plan_and_height(level)
     names = [result.refined.observations.point_ids[number] for number in result.points.number]
+    basis = [
+        {"strip": strip.strip.id, "sigma_um": value * 1000.0, "basis": basis}
+        for strip, value, basis in zip(result.strips, precision.sigma, precision.basis, strict=True)
+    ]
     block = {
-        "basis": [
-            {"strip": strip.strip.id, "sigma_um": value * 1000.0, "basis": basis}
-            for strip, value, basis in zip(result.strips, precision.sigma, precision.basis, strict=True)
-        ]
-        or _basis_of_singles(result),
+        "basis": Table.of_rows("precision.basis", basis or _basis_of_singles(result)),
         "points": {name: _summed(column, names) for name, column in zip(("plan", "height"), sigma.T, strict=True)},
-        "along": Records.joined(
-            _along(result, strip, sigma, photos) for strip, photos in zip(result.strips, precision.photos, strict=True)
+        "along": Table.joined(
+            "precision.along",
+            (
+                _along(result, strip, sigma, photos)
+                for strip, photos in zip(result.strips, precision.photos, strict=True)
+            ),
         ),
     }
     check = _check(result, found)
@@ -157,12 +165,12 @@ def _summed(sigma: Floats, names: list[str]) -> Document:
     return {"rms": rms(sigma), "max": sigma[worst], "worst": names[worst]}
 
 
-def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> Records:
+def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> Table:
     """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
     centers = strip.centers.copy()
     known, places = np.isfinite(centers[:, 0]), np.arange(len(centers))
     if not known.any():
-        return Records({})
+        return Table.of_rows("precision.along", ())
     for column in centers.T:  # a photo without a centre stands at the others' mean distance
         column[~known] = np.interp(places[~known], places[known], column[known])
     along = centers[:, 0]
@@ -185,7 +193,7 @@ def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) ->
         "centre_plan": centre_plan,
         "centre_height": centre_height,
     }
-    return records("precision.along", columns)
+    return Table.of("precision.along", columns)
 
 
 def _check(result: Result, found: Differences) -> Document:
@@ -209,18 +217,21 @@ def _check(result: Result, found: Differences) -> Document:
     return {
         "plan": _inside(sound[:, 0], INSIDE["plan"], 2) | {"p": _larger(result, tests.values(), (0, 1))},
         "height": _inside(sound[:, 1], INSIDE["height"], 1) | {"p": _larger(result, tests.values(), (2,))},
-        "points": records("precision.check.points", points),
-        "tests": [
-            {
-                "strip": name,
-                "points": errors.points,
-                "coordinates": errors.coordinates,
-                "independent": errors.independent,
-                "squares": errors.squares,
-                "p": errors.probability,
-            }
-            for name, errors in tests.items()
-        ],
+        "points": Table.of("precision.check.points", points),
+        "tests": Table.of_rows(
+            "precision.check.tests",
+            (
+                {
+                    "strip": name,
+                    "points": errors.points,
+                    "coordinates": errors.coordinates,
+                    "independent": errors.independent,
+                    "squares": errors.squares,
+                    "p": errors.probability,
+                }
+                for name, errors in tests.items()
+            ),
+        ),
     }
 
 

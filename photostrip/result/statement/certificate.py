@@ -11,11 +11,9 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
-from itertools import chain, groupby, islice
-from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +23,8 @@ from photostrip import __version__, number_columns
 from photostrip.arrays import Floats, pieces
 from photostrip.geodesy.proj_operation import proj_versions
 from photostrip.notes import Document
-from photostrip.number_columns import Cells, Texts
-from photostrip.result.numbers import RoundedColumn
-from photostrip.result.records import Named, Records, column_of
+from photostrip.number_columns import Cells
+from photostrip.result.table import Table
 
 if TYPE_CHECKING:
     from photostrip.geodesy.frame_spec import FrameSpec
@@ -55,10 +52,14 @@ def certificate_of(
         "result_sha256": result_hash(document),
         **settings,
         "epochs": [frame.epoch for frame in frames],
-        "inputs": [{"file": name, "sha256": inputs[name]} for name in sorted(inputs)],
-        "grids": [{"file": name, "sha256": grids[name]} for name in sorted(grids)],
+        "inputs": _hashes("inputs", inputs),
+        "grids": _hashes("grids", grids),
         "versions": versions(with_proj=any(frame.crs.casefold() not in WITHOUT_PROJ for frame in frames)),
     }
+
+
+def _hashes(name: str, files: Mapping[str, str]) -> Table:
+    return Table.of(f"certificate.{name}", {"file": sorted(files), "sha256": [files[file] for file in sorted(files)]})
 
 
 def result_hash(document: Document) -> str:
@@ -77,13 +78,8 @@ def _lines(document: Document) -> Iterator[str]:
     places = [DEGREES if frame["kind"] == "geographic" and axis != "up" else METRES for axis in frame["axes"]]
     yield from _rows("point", document["points"], ("id", "role"), dict(zip("xyz", places, strict=True)))
     yield from _rows("photo", document["photos"], ("id",), dict(zip("xyz", places, strict=True)))
-    photos = document["photos"]
-    angles = photos.columns["angles"] if isinstance(photos, Records) else [photo["angles"] for photo in photos]
-    for unit, of_unit in groupby(angles, itemgetter("unit")):
-        values = [each["values"] or () for each in of_unit]
-        cells = _cells(_floats(chain.from_iterable(values)), ANGLES[unit])
-        written = iter(number_columns.joined([cells], "\n").split("\n"))
-        yield "\n".join(f"angles {' '.join(islice(written, len(each)))}" for each in values)
+    unit = document["angles"]["unit"]
+    yield from _rows("angles", document["photos"], (), dict.fromkeys(("angle_1", "angle_2", "angle_3"), ANGLES[unit]))
     yield from _rows("given", document["control"], ("id", "role", "use"), dict.fromkeys(("dx", "dy", "dz"), METRES))
     yield from _rows("rejected", document["rejected"], ("photo", "point", "stage"), {})
     yield f"verdict {document['status']}"
@@ -96,7 +92,7 @@ def _figures(value: Any) -> Iterator[str]:  # noqa: ANN401 (any value)
         for key in sorted(value.keys() - WORDS):
             yield key
             yield from _figures(value[key])
-    elif isinstance(value, list):
+    elif isinstance(value, list | Table):
         for each in value:
             yield from _figures(each)
     elif isinstance(value, str):
@@ -105,25 +101,14 @@ def _figures(value: Any) -> Iterator[str]:  # noqa: ANN401 (any value)
         yield "-" if value is None else f"{float(f'{value:.{METRES}f}') + 0.0:.{METRES}f}"
 
 
-def _rows(what: str, rows: Records | list[Document], texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:
-    """Write a line for each record, with these texts and these numbers."""
-    ids, values = [_texts(column_of(rows, key)) for key in texts], [_floats(column_of(rows, key)) for key in numbers]
-    for part in pieces(len(rows)):
-        cells = [number_columns.as_texts(column[part]) for column in ids]
-        cells += [_cells(column[part], places) for column, places in zip(values, numbers.values(), strict=True)]
-        first, between = (number_columns.repeated(text, part.stop - part.start) for text in (what, " "))
+def _rows(what: str, table: Table, texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:
+    """Write a line for each row, with these texts and these numbers, ``-`` for those that do not exist."""
+    for part in pieces(len(table)):
+        size = part.stop - part.start
+        cells = [number_columns.as_texts(list(map(str, table[key][part]))) for key in texts]
+        cells += [_cells(table[key][part], places) for key, places in numbers.items()]
+        first, between = (number_columns.repeated(text, size) for text in (what, " "))
         yield number_columns.joined([first, *(each for column in cells for each in (between, column))], "\n")
-
-
-def _texts(column: Sequence[Any]) -> Texts:
-    if isinstance(column, Named):
-        return number_columns.texts_of(column.names)[column.numbers]
-    return number_columns.texts_of(list(map(str, column)))
-
-
-def _floats(values: Iterable[float | None]) -> Floats:
-    """Return numbers as an array, NaN for those that do not exist."""
-    return np.array(values if isinstance(values, RoundedColumn) else list(values), float)
 
 
 def _cells(values: Floats, decimals: int) -> Cells:

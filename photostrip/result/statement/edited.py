@@ -7,8 +7,10 @@ from contextlib import contextmanager
 
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
+from photostrip.result.table import Table
 from photostrip.result.verdict import FAILED, LOOK
 
+WITHOUT_PLACE: Document = {"strip": "", "photos": [], "points": [], "key": ""}
 FIX = "run the project again"
 EDITED = "its numbers are not those of its certificate: it was edited after it was written"
 # what Python raises on a value that is not of the form that is expected there, and on a word that is none of a few
@@ -38,9 +40,9 @@ def as_reported(document: Document, file: str) -> Document:
     edited = {
         "status": document["status"] if document["status"] == FAILED else LOOK,
         "verdict": verdict | {"look_at": [f"{note}; {FIX}", *verdict["look_at"]]},
-        "notes": [warning | {"strip": "", "photos": [], "points": [], "key": ""}, *document["notes"]],
+        "notes": Table.of_rows("notes", [warning | WITHOUT_PLACE, *document["notes"]]),
     }
-    return type(document)({**document, **edited})  # of its own class, which tells the keys that are missing
+    return {**document, **edited}
 
 
 @contextmanager
@@ -49,7 +51,7 @@ def faults_of_edited(
 ) -> Iterator[None]:
     """Turn what a document has in another form than it was written in into a fault of its file.
 
-    A key that is missing there has been told before (``reading.Located``). Where the certificates vouch for all
+    A key that is missing has been told when it was read. Where the certificates vouch for all
     documents, an error is one of this program, and stays what it is.
     doing: ``reported`` or ``compared``.
     given: documents with their files, that which has no certificate last.

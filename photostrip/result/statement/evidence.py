@@ -11,9 +11,9 @@ from photostrip.notes import Document
 from photostrip.pipeline.results import Result
 from photostrip.result.points.given import Differences
 from photostrip.result.quantities import record
-from photostrip.result.records import column_of
 from photostrip.result.statement.figures import figures_of
 from photostrip.result.statement.stating import reason, stated
+from photostrip.result.table import Table
 from photostrip.result.verdict import FAILED, UNVERIFIED
 
 
@@ -23,12 +23,12 @@ def statement_of(result: Result, found: Differences, document: Document) -> Docu
     measured = control.check & (result.control_rows >= 0)
     figures = figures_of(found.parts[measured], _sigma(result, measured))
     ids = [name for name, yes in zip(control.ids, control.check.tolist(), strict=True) if yes]
-    given = zip(*(column_of(document["control"], key) for key in ("id", "role", "stands_out")), strict=True)
+    given = zip(*map(document["control"].values, ("id", "role", "stands_out")), strict=True)
     odd = [name for name, role, parts in given if role == "check" and parts]
     block = {
         "status": "",
         "not_measured": len(ids) - int(measured.sum()),
-        "reasons": list(_reasons(document, figures, ids, odd)),
+        "reasons": Table.of_rows("statement.reasons", _reasons(document, figures, ids, odd)),
         **figures,
         "sentences": [],
         "remarks": [],

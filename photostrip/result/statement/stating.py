@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from photostrip.notes import Document
 from photostrip.result.statement.figures import CENTIMETRES, LINE_95
+from photostrip.result.table import Table
 
 TESTED, REDUCED, NOT_MET, REFUSED = "tested", "reduced", "not met", "refused"
 MINIMUM = 30  # check points: ASPRS, edition 2
@@ -29,7 +30,7 @@ def stated(block: Document, wanted: Mapping[str, float] | None = None) -> Docume
         class of whole centimetres is claimed that the check points keep.
     """
     claimed = {part: (wanted or {}).get(part, block[part]["class_cm"]) for part in PARTS}
-    reasons = [*block["reasons"], *_survey(block, claimed)]
+    reasons = Table.of_rows("statement.reasons", [*block["reasons"], *_survey(block, claimed)])
     block = {**block, "reasons": reasons, "remarks": list(_remarks(block))}
     if reasons:
         return block | {"status": REFUSED, "sentences": []}

@@ -15,6 +15,7 @@ from photostrip.project.check import check_project
 from photostrip.report.commands.check import check_sections
 from photostrip.report.page.parts import Table
 from photostrip.report.page.text import to_text
+from photostrip.result.table import rows_of
 from tests.loops import nonempty
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
 from tests.results import spec, write_project
@@ -317,7 +318,7 @@ def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: 
     text = table.read_text(encoding="utf-8").replace("\n", "\nIMG_1,P1,1,2\n", 1)
     table.write_text(text, encoding="utf-8")
     _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "json")
-    note = json.loads(out)["notes"][0]
+    note = rows_of(json.loads(out)["notes"])[0]
     assert (note["code"], note["file"], note["line"]) == ("photo-in-no-strip", "observations.csv", 2)
     assert str(tmp_path) not in out
     _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "github")

@@ -33,7 +33,7 @@ def test_a_project_is_written_and_can_be_read(spec: Path, capsys: pytest.Capture
     ]
     project = load_project(folder / "project.yaml")
     assert project.inputs.strips[0].photos == ("1001", "1002", "1003", "1004")
-    assert json.loads((folder / "truth.json").read_text(encoding="utf-8"))["photostrip_truth"] == 1
+    assert json.loads((folder / "truth.json").read_text(encoding="utf-8"))["photostrip_truth"] == 2
     image_points = len((folder / "observations.csv").read_text(encoding="utf-8").splitlines()) - 1
     captured = capsys.readouterr()
     assert captured.out == ""

@@ -77,7 +77,7 @@ def test_the_exit_code_says_whether_it_is_met(options: list[str], code: int) -> 
 
 
 def test_fewer_points_end_with_1(result: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    few = block(plan=GOOD | {"count": 12, "largest": 0.3})
+    few = block(plan=GOOD | {"count": 12, "largest": 0.3}, height=result["statement"]["height"])
     written(result | {"statement": few})
     assert main(["statement", "result.json", "--quiet"]) == 1
     assert "DOES NOT MEET THE MINIMUM" in capsys.readouterr().out
@@ -91,7 +91,7 @@ def test_what_is_refused_says_why(result: dict[str, Any], capsys: pytest.Capture
     assert "statement-frame" in capsys.readouterr().out
     written(result | {"statement": {}})
     assert main(["statement", "result.json"]) == 2
-    assert "key 'statement." in capsys.readouterr().err
+    assert "statement.status: is missing" in capsys.readouterr().err
     with open("result.json", "w", encoding="utf-8") as file:  # noqa: PTH123 (the working folder)
         file.write(to_json(certified(result) | {"statement": result["statement"] | {"not_measured": 7}}))
     assert main(["statement", "result.json"]) == 2

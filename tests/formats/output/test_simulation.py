@@ -18,6 +18,7 @@ from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.project.loading import load_project
+from photostrip.result.table import rows_of
 from photostrip.simulation import (
     DIGITAL,
     FILM,
@@ -34,6 +35,7 @@ from photostrip.simulation import (
     simulate,
 )
 from tests.loops import nonempty
+from tests.results import rotation
 from tests.simulated import inputs_of, settings_of
 from tests.source_tree import ROOT
 
@@ -246,18 +248,18 @@ def test_the_truth_is_written_in_full(name: str) -> None:
         ("points", done.observations.point_ids, done.truth.ground.xyz),
         ("photos", done.observations.photo_ids, done.truth.centers_ground),
     ):
-        assert [each["id"] for each in truth[block]] == list(ids)
-        found = np.array([[each[axis] for axis in "xyz"] for each in truth[block]])
+        assert truth[block]["id"] == list(ids)
+        found = np.column_stack([truth[block][axis] for axis in "xyz"])
         assert (np.abs(found - enu[:, columns]) < tolerance).all()
-    for photo, rotation in nonempty(zip(truth["photos"], done.truth.rotations_local, strict=True)):
-        assert np.array(photo["rotation"]).reshape(3, 3) == pytest.approx(rotation, abs=1e-11)
-        angles = from_alpha_omega_kappa(*np.radians(photo["angles"]["values"]))
-        assert angles == pytest.approx(rotation, abs=1e-11)
-    roles = {each["id"]: each["role"] for each in truth["points"] if each["role"] != "new"}
+    for photo, turn in nonempty(zip(rows_of(truth["photos"]), done.truth.rotations_local, strict=True)):
+        assert rotation(photo) == pytest.approx(turn, abs=1e-11)
+        angles = from_alpha_omega_kappa(*np.radians([photo[f"angle_{k}"] for k in (1, 2, 3)]))
+        assert angles == pytest.approx(turn, abs=1e-11)
+    roles = {each["id"]: each["role"] for each in rows_of(truth["points"]) if each["role"] != "new"}
     given = zip(done.control.ids, done.control.check, strict=True)
     assert roles == {point: "check" if check else "control" for point, check in given}
-    swap, control = truth["errors"]
-    assert list(swap) == ["kind", "photo", "point", "other"]
+    swap, control = rows_of(truth["errors"])
+    assert [key for key, value in swap.items() if value is not None] == ["kind", "photo", "point", "other"]
     assert axes["xyz".index(control["axis"])] in {"east", "x"}
     assert abs(control["size_m"]) == 5.0
 
@@ -306,8 +308,10 @@ def test_a_tiny_project_never_changes() -> None:
     for name, text in EXPECTED.items():
         assert files[name] == text, name
     truth = json.loads(files["truth.json"])
-    assert [truth["photos"][0][axis] for axis in "xyz"] == FIRST_CENTER
-    assert truth["errors"] == [{"kind": "image", "photo": "1002", "point": "K01", "axis": "x", "size_um": 200.0}]
+    assert [truth["photos"][axis][0] for axis in "xyz"] == FIRST_CENTER
+    (error,) = rows_of(truth["errors"])
+    known = {key: value for key, value in error.items() if value is not None}
+    assert known == {"kind": "image", "photo": "1002", "point": "K01", "axis": "x", "size_um": 200.0}
     assert hashlib.sha256(files["project.yaml"].encode()).hexdigest() == hashlib.sha256(PROJECT.encode()).hexdigest()
 
 

@@ -136,21 +136,6 @@ def test_offset_and_drift_are_found_as_they_are() -> None:
         assert abs(found[f"positions B: offset {name}"]) < 1e-4
 
 
-def test_a_free_network_has_the_shape_of_the_truth() -> None:
-    simulation = simulate(BLOCK)
-    result = adjusted(simulation, with_control(simulation, []))
-    assert result.output.kind == "local"
-    number = {name: row for row, name in enumerate(simulation.truth.points.ids)}
-    ids = result.refined.observations.point_ids
-    truth = simulation.truth.points.xyz[[number[ids[n]] for n in result.points.number]]
-    found = result.points.cartesian
-    pairs = [(0, 5), (3, 20), (7, 40), (11, 33)]
-    ratios = [np.linalg.norm(found[i] - found[j]) / np.linalg.norm(truth[i] - truth[j]) for i, j in pairs]
-    assert np.ptp(ratios) / ratios[0] < 1e-9
-    assert np.isnan(result.control_differences).all()
-    assert document_of(result)["bundle"]["free_network"] is True
-
-
 @pytest.mark.slow
 def test_single_photos_join_a_strip() -> None:
     """Every strip but the first is cut into photos of their own."""

@@ -55,7 +55,7 @@ def test_every_output_knows_single_photos() -> None:
         assert "Bundle adjustment" in titles
         assert "Relative orientation" not in titles
     assert to_html(document).count("<svg") >= 2
-    assert set(result_files(document)) > {"points.csv", "photos.csv", "reliability.csv"}
+    assert set(result_files(document)) > {"points.csv", "photos.csv", "residuals.csv"}
     assert "absolute" not in trace_sheet(result).document()
     assert compare_results(document, document)["status"] == "same"
 

@@ -120,24 +120,6 @@ def test_standard_deviations_are_those_of_repetitions() -> None:
         assert ratio.max() < 1.01
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("_no_findings")
-def test_correlated_model_coordinates_count_as_such() -> None:
-    """Heights that go with x, as of a plotter read obliquely: known, they are weighted; ignored, points get worse."""
-    given, rng = truth(8, 3, 1), np.random.default_rng(3)
-    root = np.linalg.cholesky(np.array([[1.0, 0.0, 0.95], [0.0, 1.0, 0.0], [0.95, 0.0, 1.0]]))
-    off: dict[bool, list[Floats]] = {True: [], False: []}
-    for _ in range(12):
-        noise = rng.normal(size=(len(given.model), 3)) @ root.T
-        measured = given.measured(noise)
-        known = replace(measured, correlation=np.tile(root @ root.T, (len(measured), 1, 1)))
-        for told, found in off.items():
-            result = triangulate(inputs(given, known if told else measured), SEARCHED_FOR_NOTHING)
-            found.append(result.points.cartesian - given.points[result.points.number])
-    rms = {told: np.sqrt(np.mean(np.concatenate(found) ** 2)) for told, found in off.items()}
-    assert rms[True] < 0.95 * rms[False]
-
-
 # ------------------------------------------------------------------------------------------------- mistakes
 
 

@@ -94,25 +94,6 @@ def test_a_drift_of_the_positions_is_named() -> None:
     assert lost(result) == []
 
 
-@pytest.mark.slow
-def test_a_principal_distance_off_by_a_percent_is_named() -> None:
-    """Positions and control tell it from a common height."""
-    simulation, result = adjusted(distance=1.01)
-    (finding,) = result.findings
-    assert finding.code == "P107"
-    assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=0.05)
-    assert rms(simulation, result) < 0.4
-
-
-@pytest.mark.slow
-def test_sound_positions_share_nothing() -> None:
-    """Nothing is taken up where nothing is wrong."""
-    _, result = adjusted()
-    assert result.findings == ()
-    assert result.bundle is not None
-    assert result.bundle.screened.common == ()
-
-
 HILLS = Spec(seed=5, flight=Flight(photos=8), control=Control(bands=4), terrain=Terrain(relief=150.0))
 
 

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import causes
+from photostrip.notes import LOST_SAY
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
@@ -25,6 +27,35 @@ def told(inputs: Inputs, settings: Settings) -> list[str]:
     """Collect codes of `check` and of `run`."""
     findings = (*gate.of_inputs(inputs, settings), *triangulate(inputs, settings).findings)
     return sorted({each.code for each in findings})
+
+
+SMALL = {  # layouts of the benchmark, and a seed that makes a small project
+    "6-60 photos, bands every 3-20, polynomial": 3,
+    "blocks held by GNSS": 1,
+    "strips held by GNSS": 4,
+    "independent models": 1,
+    "oblique mounts": 2,
+    "oblique blocks": 2,
+    "convergent strips": 1,
+    "systematic errors of 5 µm, blocks": 4,
+    "film with fiducial marks": 4,
+    "two lists in two zones": 1,
+    "given orientations": 3,
+    "narrow field of view, 305 mm": 1,
+    "UAV corridor, 35 mm, long side across": 4,
+    "UAV corridor, 1 inch, long side along": 4,
+    "kite, photos in any order": 1,
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_sound_project_has_no_finding_however_it_is_laid_out(name: str) -> None:
+    make, may_be_told = causes.LAYOUTS[name]
+    case = make(SMALL[name])
+    found = causes.told(case.inputs, case.settings)
+    assert found.refusal == ""
+    assert found.out == frozenset()
+    assert {each.code for each in (*found.check, *found.run)} - may_be_told - set(LOST_SAY) == set()
 
 
 @pytest.mark.slow

@@ -19,9 +19,7 @@ from photostrip.planning.single_model import (
     element_covariance,
     expected_errors,
     free_covariance,
-    free_influence,
     influence,
-    measured_covariance,
     orientation_operator,
     parameter_rows,
 )
@@ -266,28 +264,6 @@ def test_expected_errors_against_the_exact_chain() -> None:
     assert np.abs(ratio - 1).max() < 0.07  # 270 repetitions know each to 1.1 %
     assert ratio.mean() == pytest.approx(1.0, abs=0.015)
     assert np.all(np.linalg.eigvalsh(own.covariance) > 0)
-
-
-def test_adjusting_the_elements_is_generalised_least_squares_and_never_worse() -> None:
-    rng = np.random.default_rng(3)
-    xy = rng.uniform((0, -60), (70, 60), (7, 2))
-    control = control_at(xy, F, (0.003, 0.002))
-    elements = np.diag(six_point_variances(0.005, F, A, B))
-    misclosure = 0.01 * rng.normal(size=(7, 3))
-    adjusted = adjust_model(control, misclosure, B, elements)
-    # the whole covariance of the misclosures at once
-    F_, G = parameter_rows(control.points, control).reshape(21, 7), free_influence(control.points, B).reshape(21, 4)
-    C = G @ elements @ G.T + np.eye(21) * (0.003**2 + 0.002**2)
-    w = misclosure.ravel()
-    p = np.linalg.solve(F_.T @ np.linalg.solve(C, F_), F_.T @ np.linalg.solve(C, w))
-    e = elements @ G.T @ np.linalg.solve(C, w - F_ @ p)
-    assert adjusted.parameters == pytest.approx(p, rel=1e-7)
-    assert adjusted.elements == pytest.approx(e, rel=1e-6)
-
-    own = measured_covariance(PLACES, B, F, 0.003)
-    plain = expected_errors(PLACES, own, control, B, elements).sigmas
-    better = np.sqrt(np.diagonal(adjusted.covariance(PLACES, own), axis1=1, axis2=2))
-    assert np.all(better < plain)
 
 
 # ------------------------------------------------------------------------------------------------------ refusals

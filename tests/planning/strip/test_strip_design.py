@@ -22,12 +22,10 @@ from photostrip.planning.ideal_strip import (
 )
 from photostrip.planning.strip_design import (
     Demand,
-    DesignTask,
     Placement,
     bands_needed,
     best_places,
     outcome,
-    plan_strip,
     worst,
 )
 from photostrip.simulation import FILM, Points
@@ -183,21 +181,6 @@ def test_the_search_finds_the_very_best_places_of_a_small_strip(method: str, cou
     # better places by less than 1 % are not told
     assert max(placed.found) <= min(every) / (1 - 0.0101)
     assert max(placed.found) >= min(every) - 1e-12
-
-
-@pytest.mark.slow
-def test_a_whole_design() -> None:
-    layouts = (ControlLayout("corners", kind="corners"), ControlLayout("bands", bands=3))
-    design = DesignTask(
-        StripGeometry(FILM, 7, points=SIMPLE), layouts, (SIMILARITY, BUNDLE), Demand(0.2), Placement(1, "corners")
-    )
-    report = plan_strip(design)
-    assert [(each.layout.name, each.method) for each in report.outcomes] == [
-        (layout, method) for layout in ("corners", "bands") for method in (SIMILARITY, BUNDLE)
-    ]
-    assert [each.method for each in report.needed] == [SIMILARITY, BUNDLE]
-    assert report.placed is not None
-    assert len(report.placed.spots) == 1
 
 
 def test_measured_perspective_centres_help_the_bundle_only() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from functools import cache
 from typing import TYPE_CHECKING
@@ -20,7 +18,7 @@ from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.adjustment.bundle import kinds
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
-from tests.results import result_files, solved, spec, write_project
+from tests.results import solved, spec, write_project
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -70,17 +68,6 @@ def test_the_page_has_no_other_unit(adjustment: str) -> None:
     page = to_html(document("gon", adjustment))
     assert "gon" in page
     assert re.findall(r"\bdeg\b|″", page) == []
-
-
-@pytest.mark.slow
-def test_points_csv_has_the_unit_in_its_head() -> None:
-    rows = {
-        unit: list(csv.DictReader(io.StringIO(result_files(document(unit))["points.csv"]))) for unit in ("deg", "gon")
-    }
-    for degrees, gons in nonempty(zip(rows["deg"], rows["gon"], strict=True)):
-        expected = float(degrees["ellipse_azimuth_deg"]) * PER_DEGREE["gon"]
-        assert abs(float(gons["ellipse_azimuth_gon"]) - expected) < 0.06
-        assert "ellipse_azimuth_deg" not in gons
 
 
 def test_small_angles_have_small_units() -> None:

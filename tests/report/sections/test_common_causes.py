@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
@@ -21,6 +20,7 @@ from photostrip.simulation import Control, Flight, Spec
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Gnss
 from tests.loops import nonempty
+from tests.results import by_rows, in_tables
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def adjusted(
 
 def said(document: Document, label: str) -> list[str]:
     """Return what the stages say under a label."""
-    (stages,) = (each for each in chosen_sections(document, width=400) if each.title == "Stages")
+    (stages,) = (each for each in chosen_sections(in_tables(document), width=400) if each.title == "Stages")
     (facts,) = stages.parts
     return [value for name, value in facts.rows if name == label]  # type: ignore[union-attr]
 
@@ -119,7 +119,7 @@ def test_a_drift_is_told_by_what_it_is_from_the_first_to_the_last() -> None:
 @pytest.mark.slow
 def test_of_many_groups_the_most_significant_are_shown() -> None:
     """Fifty strips with an offset each do not fill the page."""
-    document = copy.deepcopy(adjusted(east=10.0, correction="offset"))
+    document = by_rows(adjusted(east=10.0, correction="offset"))
     rows = [row for row in document["bundle"]["corrections"] if row["group"] == "strip A"]
     document["bundle"]["corrections"] = [
         {**row, "group": f"strip {n}", "whole": float(n % 31)} for n in range(50) for row in rows
@@ -131,19 +131,11 @@ def test_of_many_groups_the_most_significant_are_shown() -> None:
 
 @pytest.mark.slow
 def test_like_causes_share_a_line_and_name_what_explains_as_much() -> None:
-    document = copy.deepcopy(adjusted(east=10.0, correction="offset"))
-    nothing = dict.fromkeys(("east", "north", "up"))
-    of_photos = [
-        {"cause": "shift of a photo", "of": f"{n}", "rivals": [], "shift": nothing, "sigma": nothing} for n in range(9)
-    ]
-    height = {"east": None, "north": None, "up": 0.612}
-    of_list = {
-        "cause": "control list",
-        "of": "control[1]",
-        "rivals": ["control list"],
-        "shift": height,
-        "sigma": {**height, "up": 0.021},
-    }
+    document = by_rows(adjusted(east=10.0, correction="offset"))
+    of_photos = [{"cause": "shift of a photo", "of": f"{n}", "rivals": []} for n in range(9)]
+    of_list: Document = {"cause": "control list", "of": "control[1]", "rivals": ["control list"]}
+    of_list |= dict.fromkeys(f"{name}_{axis}" for name in ("shift", "sigma") for axis in ("east", "north"))
+    of_list |= {"shift_up": 0.612, "sigma_up": 0.021}
     document["bundle"]["taken_up"] = [*of_photos, of_list]
     assert said(document, "taken up") == [
         "shift of photos 0, 1, 2 and 6 more",

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 
 from photostrip.report.page.parts import Facts, Table
 from photostrip.report.sections.decisions import WEIGHTS_SHOWN, decisions_section, weights_section
-from photostrip.result.records import as_lists
 from tests.loops import nonempty
-from tests.results import case
+from tests.results import by_rows, case, in_tables
 
 
 def facts(document: dict[str, object]) -> dict[str, str]:
-    (part,) = decisions_section(document).parts
+    (part,) = decisions_section(in_tables(document)).parts
     return dict(part.rows) if isinstance(part, Facts) else {}
 
 
 def weights(document: dict[str, object], *, everything: bool = False) -> Table:
-    (part,) = weights_section(document, everything=everything).parts
+    (part,) = weights_section(in_tables(document), everything=everything).parts
     assert isinstance(part, Table)
     return part
 
@@ -36,7 +33,7 @@ def test_what_auto_came_to_is_said(frame: str) -> None:
 
 
 def test_what_was_asked_for_is_no_decision() -> None:
-    document = copy.deepcopy(case("local").document)
+    document = by_rows(case("local").document)
     document["polynomials"][0]["asked"] = "2"
     document["settings"]["relative"]["screening"] = "tau"
     document["corrections"]["earth_curvature"]["asked"] = "none"
@@ -44,7 +41,7 @@ def test_what_was_asked_for_is_no_decision() -> None:
 
 
 def test_an_automatic_limit_and_automatic_heights_are_said() -> None:
-    document = copy.deepcopy(case("local").document)
+    document = by_rows(case("local").document)
     document["settings"]["relative"]["screening"] = "parallax+grubbs"
     document["settings"]["refinement"]["refraction"] = True
     document["settings"]["interior"]["transform"] = "auto"
@@ -59,8 +56,8 @@ def test_a_weight_is_that_of_the_fit() -> None:
     """The standard deviation in the fit is that of the given coordinate together with that of a point of a model."""
     document = case("projected").document
     table = weights(document)
-    precision = document["strips"][0]["precision"]
-    point = np.array([precision["plan"], precision["plan"], precision["height"]])
+    plan, height = (document["strips"][0][f"precision_{part}"] for part in ("plan", "height"))
+    point = np.array([plan, plan, height])
     assert len(table.rows) == sum(row["role"] == "control" for row in document["control"])
     for row in nonempty(table.rows):
         given, fit = np.array(row[2:5], float), np.array(row[5:8], float)
@@ -68,7 +65,7 @@ def test_a_weight_is_that_of_the_fit() -> None:
 
 
 def test_coordinates_that_do_not_count_weigh_nothing() -> None:
-    document = copy.deepcopy(dict(as_lists(case("projected").document)))
+    document = by_rows(case("projected").document)
     row = next(each for each in document["control"] if each["role"] == "control")
     row["use"] = "xy"
     first = weights(document).rows[0]
@@ -80,7 +77,7 @@ def test_coordinates_that_do_not_count_weigh_nothing() -> None:
 
 
 def test_long_lists_are_cut_and_say_so() -> None:
-    document = copy.deepcopy(case("projected").document)
+    document = by_rows(case("projected").document)
     row = next(each for each in document["control"] if each["role"] == "control")
     document["control"] = [row | {"id": f"G{n}", "list": 1 + n % 2} for n in range(40)]
     table = weights(document)

@@ -16,6 +16,7 @@ from photostrip.report.sections.accuracy_report import SectionName, chosen_secti
 from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
 from tests.reports import saved
+from tests.results import rotation
 
 if TYPE_CHECKING:
     from photostrip.notes import Document
@@ -47,13 +48,12 @@ def test_the_marks_of_given_points_are_shown_in_pixels(block: Document) -> None:
     assert isinstance(table, Table)
     shown = {(row[0], row[2]): row for row in table.rows}
     given, used = {row["id"]: row["role"] for row in block["control"]}, []
-    for photo in nonempty(block["residuals"]):
-        for point, vx, vy, kept in zip(*(photo[key] for key in ("points", "vx_um", "vy_um", "used")), strict=True):
-            if point in given:
-                _, role, _, x, y, *_, state = shown.pop((point, photo["photo"]))
-                assert (role, state) == (given[point], "" if kept else "not used")
-                assert [float(x), float(y)] == pytest.approx([vx / PIXEL_UM, vy / PIXEL_UM], abs=0.006)
-                used += [vx, vy] if kept and role == "control" else []
+    for ray in nonempty(block["residuals"].where(point=set(given))):
+        _, role, _, x, y, *_, state = shown.pop((ray["point"], ray["photo"]))
+        assert (role, state) == (given[ray["point"]], "" if ray["used"] else "not used")
+        v = [ray["vx_um"], ray["vy_um"]]
+        assert [float(x), float(y)] == pytest.approx([each / PIXEL_UM for each in v], abs=0.006)
+        used += v if ray["used"] and role == "control" else []
     assert shown == {}
     assert [column.unit for column in table.columns if column.name.startswith("v ")] == ["px", "px"]
     assert isinstance(facts, Facts)
@@ -82,9 +82,9 @@ def test_marks_of_film_are_shown_in_micrometres() -> None:
 def test_the_ground_that_a_pixel_covers_is_that_of_depth_and_principal_distance(block: Document) -> None:
     points = {row["id"]: np.array([row[axis] for axis in "xyz"]) for row in block["points"]}
     sizes = []
-    for photo, rays in zip(nonempty(block["photos"]), block["residuals"], strict=True):
-        axes, center = np.reshape(photo["rotation"], (3, 3)), np.array([photo[axis] for axis in "xyz"])
-        seen = [point for point, used in zip(rays["points"], rays["used"], strict=True) if used]
+    for photo in nonempty(block["photos"]):
+        axes, center = rotation(photo), np.array([photo[axis] for axis in "xyz"])
+        seen = block["residuals"].where(photo=photo["id"], used=True)["point"]
         depths = [-((points[point] - center) @ axes)[2] for point in seen]
         sizes.append(median(depths) * PIXEL_UM / 8800.0)
     size = block["summary"]["gsd"]

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import copy
-import json
-
 import pytest
 
+from photostrip.formats.output.result_json import read_baseline
 from photostrip.report.page.parts import Facts, Section, Table, Words
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, sections_of, title_of
 from photostrip.report.sections.overview import MOST_LINES, overview
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import FRAMES, Document, case
+from tests.results import FRAMES, Document, by_rows, case, in_tables
 from tests.source_tree import ROOT
 
 
@@ -23,13 +21,23 @@ def lines(document: Document, width: int = 100) -> list[str]:
 
 def crowded() -> Document:
     """Give a result in which there is too much of everything: a block of 60 strips with 1000 pairs."""
-    document = copy.deepcopy(saved())
+    document = by_rows(saved())
     control, check = (next(row for row in document["control"] if row["role"] == role) for role in ("control", "check"))
     strip, pair, polynomial = document["strips"][0], document["models"][0], document["polynomials"][0]
     text = "a sentence of some length that says with ids, numbers and units what is wrong with this one and why " * 3
     note = {"severity": "note", "message": text, "strip": "", "photos": [], "points": []}
+    note |= {"file": "", "line": 0, "column": 0, "key": ""}
     finding = {"title": "a mistake", "severity": "error", "accepted": False, "message": text, "fix": text}
-    finding |= {"evidence": {"size_m": 1.0}, "points": [], "file": "", "line": 0, "column": 0, "key": ""}
+    finding |= {
+        "evidence": {"size_m": 1.0},
+        "points": [],
+        "photos": [],
+        "strips": [],
+        "file": "",
+        "line": 0,
+        "column": 0,
+        "key": "",
+    }
     document |= {
         "status": "failed",
         "control": [{**row, "id": f"{n}"} for n in range(300) for row in (control, check)],
@@ -46,7 +54,12 @@ def crowded() -> Document:
         "verdict": {**document["verdict"], "look_at": [f"{n} {text}" for n in range(50)]},
     }
     document["counts"]["strips"] = 60
-    return document
+    document["precision"]["check"]["points"] = [
+        {**document["precision"]["check"]["points"][0], "id": f"{n}", "plan": float(n), "p_plan": 1.0 / (1 + n)}
+        for n in range(300)
+    ]
+    found: Document = in_tables(document)
+    return found
 
 
 @pytest.mark.parametrize("strips", [1, 2])
@@ -68,7 +81,7 @@ def test_it_is_short_with_too_much_of_everything() -> None:
 
 @pytest.mark.parametrize("sample", ["simulated-20", "apollo15-metric-strip"])
 def test_it_is_short_on_a_terminal_of_80_columns(sample: str) -> None:
-    document = json.loads((ROOT / "sample_data" / sample / "baseline.json").read_text(encoding="utf-8"))
+    document = read_baseline(str(ROOT / "sample_data" / sample / "baseline.json"))
     assert 60 < len(lines(document, 80)) <= MOST_LINES
 
 
@@ -88,11 +101,6 @@ def test_each_stage_has_one_line() -> None:
 
 def test_the_worst_check_points_are_shown_and_the_others_counted() -> None:
     document = crowded()
-    checks = [row["id"] for row in document["control"] if row["role"] == "check"]
-    known = document["precision"]["check"]["points"][0]
-    document["precision"]["check"]["points"] = [
-        {**known, "id": name, "plan": float(number), "p_plan": 1.0 / (1 + number)} for number, name in enumerate(checks)
-    ]
     (section,) = (each for each in overview(document, 100) if each.title == "Check points")
     (table,) = (part for part in section.parts if isinstance(part, Table))
     assert [row[0] for row in table.rows[:2]] == ["299", "298"]
@@ -101,15 +109,16 @@ def test_the_worst_check_points_are_shown_and_the_others_counted() -> None:
 
 def test_nothing_is_said_twice() -> None:
     """What a warning or a finding says stands in the verdict alone; the plausibility has its cure."""
-    document = copy.deepcopy(saved())
+    document = by_rows(saved())
     warning = {"code": "c", "severity": "warning", "message": "mind this", "strip": "", "photos": [], "points": []}
+    warning |= {"file": "", "line": 0, "column": 0, "key": ""}
     finding = {
         "code": "P101", "title": "units", "severity": "warning", "accepted": False, "message": "too large by 1000",
         "fix": "write `um`", "evidence": {}, "points": [], "file": "", "line": 0, "column": 0,
     }  # fmt: skip
     document |= {"notes": [warning], "findings": [finding]}
     document["verdict"] = {**document["verdict"], "look_at": ["P101 too large by 1000", "mind this"]}
-    printed = "\n".join(lines(document))
+    printed = "\n".join(lines(in_tables(document)))
     assert printed.count("mind this") == 1
     assert printed.count("too large by 1000") == 1
     assert "- P101 units (warning). To put it right: write `um`." in printed
@@ -118,6 +127,7 @@ def test_nothing_is_said_twice() -> None:
 def test_notes_of_a_kind_are_said_once() -> None:
     notes = [
         {"code": "c", "severity": "note", "message": f"strip {name}: so", "strip": name, "photos": [], "points": []}
+        | {"file": "", "line": 0, "column": 0, "key": ""}
         for name in "ABC"
     ]
     assert "- strip A: so (and the same for strips B, C)" in lines({**saved(), "notes": notes})

@@ -43,8 +43,8 @@ def test_a_parallax_limit_holds_where_grubbs_allows_more() -> None:
 @pytest.mark.parametrize("screening", ["auto", "deletion", "robust", "tau", "parallax+grubbs"])
 def test_what_was_used_lies_within_the_limits_and_what_was_rejected_beyond(screening: str) -> None:
     document = run(screening).document
-    for model, pair in nonempty(zip(document["models"], document["parallaxes"], strict=True)):
-        used = [size for size, used in zip(pair["q_um"], pair["used"], strict=True) if used]
+    for model in nonempty(document["models"]):
+        used = document["parallaxes"].where(left=model["left"], used=True)["q_um"]
         assert 5.0 < model["limit_um"] < 60.0
         assert np.median(np.abs(used)) < model["limit_um"]
     size = {(row["left"], row["right"]): row["limit_um"] for row in document["models"]}

@@ -9,11 +9,12 @@ from functools import cache
 
 import numpy as np
 
-from photostrip.formats.output.result_files import refined_csv
+from photostrip.formats.output.result_files import csv_pieces
 from photostrip.library.result import Result
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.parts import Table
 from photostrip.report.sections.accuracy_report import SectionName, chosen_sections
+from photostrip.result.points.image_coordinates import refined_table
 from photostrip.simulation import Models, simulate
 from photostrip.simulation.spec import Film
 from tests.loops import nonempty
@@ -53,12 +54,13 @@ def test_the_coefficients_and_residuals_are_those_of_the_measured_marks() -> Non
         assert [row["photo"] for row in document["fiducials"]] == list(inputs.strips[0].photos)
         for row in nonempty(document["fiducials"]):
             assert row["transform"] == transform
-            assert len(row["marks"]) == 8
             calibrated = inputs.strips[0].camera.fiducials
-            for mark, vx, vy in zip(row["marks"], row["vx_um"], row["vy_um"], strict=True):
-                xy = transformed(row["coefficients"], *measured[row["photo"], mark])
-                expected = (np.array(xy) - calibrated[mark]) * MICROMETRES
-                assert np.abs(expected - (vx, vy)).max() < 0.006  # µm; two decimals
+            residuals = document["fiducial_marks"].where(photo=row["photo"])
+            assert len(residuals) == row["marks"] == 8
+            for each in residuals:
+                xy = transformed(row["coefficients"], *measured[row["photo"], each["mark"]])
+                expected = (np.array(xy) - calibrated[each["mark"]]) * MICROMETRES
+                assert np.abs(expected - (each["vx_um"], each["vy_um"])).max() < 0.006  # µm; two decimals
 
 
 def test_every_key_of_them_is_described() -> None:
@@ -69,7 +71,7 @@ def test_refined_csv_has_every_image_point_after_every_correction() -> None:
     known = film()
     camera = known.inputs.strips[0].camera
     coefficients = {row["photo"]: row["coefficients"] for row in known.document["fiducials"]}
-    table = rows("".join(refined_csv(known.result)))
+    table = rows("".join(csv_pieces(refined_table(known.result))))
     assert len(table) == len(known.inputs.observations)
     assert [row["photo"] for row in table] == sorted(row["photo"] for row in table)
     assert camera.distortion is None
@@ -92,7 +94,7 @@ def test_ids_are_quoted_in_refined_csv() -> None:
     o = inputs.observations
     named = replace(o, photo_ids=tuple(f"{name},%s" for name in o.photo_ids))
     strips = tuple(replace(s, photos=tuple(f"{name},%s" for name in s.photos)) for s in inputs.strips)
-    table = rows("".join(refined_csv(solved(replace(inputs, observations=named, strips=strips)).result)))
+    table = rows("".join(csv_pieces(refined_table(solved(replace(inputs, observations=named, strips=strips)).result))))
     assert {row["photo"] for row in table} == set(named.photo_ids)
 
 
@@ -101,8 +103,8 @@ def test_the_report_shows_every_mark_and_coefficient() -> None:
     shapes, coefficients, residuals = (part for part in section.parts if isinstance(part, Table))
     assert (len(shapes.rows), len(coefficients.rows), len(residuals.rows)) == (5, 10, 40)
     assert {column.unit for column in shapes.columns} == {"", "µm", "gon"}
-    first = film().document["fiducials"][0]
-    assert residuals.rows[0] == ("1001", first["marks"][0], f"{first['vx_um'][0]:.1f}", f"{first['vy_um'][0]:.1f}")
+    first = film().document["fiducial_marks"][0]
+    assert residuals.rows[0] == ("1001", first["mark"], f"{first['vx_um']:.1f}", f"{first['vy_um']:.1f}")
     (section,) = chosen_sections(film("projective").document, names=[SectionName.FIDUCIALS])
     coefficients = [part for part in section.parts if isinstance(part, Table)][1]
     assert [row[1] for row in coefficients.rows[:3]] == ["x", "y", "divided by"]

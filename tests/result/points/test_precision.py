@@ -19,7 +19,7 @@ from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.document import document_of
 from photostrip.result.points.own_precision import normalised
-from photostrip.result.points.precision import ellipses
+from photostrip.result.points.precision import COVARIANCES, ellipses
 from tests.loops import nonempty
 from tests.results import FRAMES, Case, case, result_files, solved
 
@@ -114,10 +114,10 @@ def test_photo_covariances_are_those_of_turned_photos(frame: str) -> None:
     scatter = np.cov(np.column_stack([along, moved]).T)
     row = known.document["photos"][number]
     expected = np.zeros((6, 6))
-    expected[np.triu_indices(6)] = row["covariance"]
+    expected[np.triu_indices(6)] = [known.document["covariances"][number][name] for name in COVARIANCES]
     spread = np.sqrt(np.diag(scatter))
-    assert [row["sigma"][axis] for axis in "xyz"] == pytest.approx(spread[:3], rel=0.01)
-    assert row["sigma"]["angles"] == pytest.approx(spread[3:], rel=0.01)
+    assert [row[f"sigma_{axis}"] for axis in "xyz"] == pytest.approx(spread[:3], rel=0.01)
+    assert [row[f"sigma_angle_{k}"] for k in (1, 2, 3)] == pytest.approx(spread[3:], rel=0.01)
     upper = np.triu_indices(6)
     assert expected[upper] == pytest.approx(scatter[upper], abs=0.012 * float(np.outer(spread, spread)[upper].max()))
     correlation = (expected / np.outer(spread, spread))[upper]
@@ -133,8 +133,8 @@ def test_tables_carry_the_precision() -> None:
             assert float(line[key]) == pytest.approx(row[key], abs=1e-9)
     photos = list(csv.DictReader(StringIO(files["photos.csv"])))
     for line, row in nonempty(zip(photos, known.document["photos"], strict=True)):
-        assert float(line["sigma_y"]) == pytest.approx(row["sigma"]["y"])
-        assert float(line["sigma_kappa_deg"]) == pytest.approx(row["sigma"]["angles"][2], abs=1e-6)
+        assert float(line["sigma_y"]) == pytest.approx(row["sigma_y"])
+        assert float(line["sigma_kappa_deg"]) == pytest.approx(row["sigma_angle_3"], abs=1e-6)
 
 
 def test_the_block_sums_up_and_follows_the_strip() -> None:
@@ -176,7 +176,8 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
     document = document_of(known)
     assert "precision" not in document
     assert all(point["sigma_x"] is None and "cov_xy" not in point for point in nonempty(document["points"]))
-    assert all(photo["sigma"] is None and "covariance" not in photo for photo in nonempty(document["photos"]))
+    assert all(photo["sigma_x"] is None for photo in nonempty(document["photos"]))
+    assert "covariances" not in document
     files = result_files(document)
     assert {row["sigma_x"] for row in csv.DictReader(StringIO(files["points.csv"]))} == {""}
     assert {row["sigma_kappa_deg"] for row in csv.DictReader(StringIO(files["photos.csv"]))} == {""}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +14,8 @@ from photostrip.result.statement.accuracy_statement import exit_code, statement_
 from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.statement.stating import stated
-from tests.results import Case, case
+from photostrip.result.table import Table
+from tests.results import Case, by_rows, case, in_tables
 
 GOOD = {"count": 30, "rmse": 0.106, "survey": 0.0424, "accuracy": 0.1141, "class_cm": 12, "mean": 0.09, "p90": 0.16}
 
@@ -24,7 +24,8 @@ def block(**parts: Any) -> dict[str, Any]:  # noqa: ANN401
     """Give a block of a result with 30 check points, with other values of some keys."""
     axis = {"rmse": 0.08, "mean": 0.001}
     found = {
-        "status": "", "not_measured": 0, "reasons": [], "sentences": [], "remarks": [],
+        "status": "", "not_measured": 0, "sentences": [], "remarks": [],
+        "reasons": Table.of_rows("statement.reasons", ()),
         "plan": GOOD, "height": {**GOOD, "rmse": 0.138, "survey": 0.05, "accuracy": 0.1471, "class_cm": 15},
         "axes": {"east": axis, "north": axis, "up": axis}, "space": {"accuracy": 0.1862, "class_cm": 19},
         "circle": {"ratio": 0.82, "ce90": 0.16, "ce95": 0.1825, "radial95": 0.1834},
@@ -34,7 +35,8 @@ def block(**parts: Any) -> dict[str, Any]:  # noqa: ANN401
 
 
 def of(given: Case, **changed: Any) -> dict[str, Any]:  # noqa: ANN401
-    found: dict[str, Any] = statement_of(given.result, differences(given.result), given.document | changed)
+    document = in_tables(given.document | changed)
+    found: dict[str, Any] = statement_of(given.result, differences(given.result), document)
     return found
 
 
@@ -104,7 +106,7 @@ def test_a_result_without_check_points_is_refused() -> None:
     without = replace(control, check=np.zeros(len(control), bool))
     result = replace(given.result, inputs=replace(given.result.inputs, control=without))
     rows = [row | {"role": "control"} for row in given.document["control"]]
-    found = statement_of(result, differences(given.result), given.document | {"control": rows})
+    found = statement_of(result, differences(given.result), in_tables(given.document | {"control": rows}))
     assert reasons(found) == {"statement-no-check-points"}
     assert found["sentences"] == []
     assert found["plan"]["accuracy"] is None
@@ -149,8 +151,12 @@ def test_the_same_points_give_the_same_figures_in_every_frame(frame: str) -> Non
 
 def certified(document: dict[str, Any]) -> dict[str, Any]:
     """Give a document as it is read again, with the hash of its numbers."""
-    found: dict[str, Any] = json.loads(json.dumps(document, default=list))
-    return found | {"certificate": {"result_sha256": result_hash(found)}}
+    found: dict[str, Any] = in_tables(by_rows(document))
+    empty = {"set": [], "resolved_sha256": "", "inputs": [], "grids": [], "epochs": [], "versions": {}}
+    versions = dict.fromkeys(("photostrip", "python", "numpy", "scipy", "pyproj", "proj", "epsg"))
+    certificate = {"result_sha256": result_hash(found), **empty, "versions": versions}
+    whole: dict[str, Any] = in_tables(found | {"certificate": certificate})
+    return whole
 
 
 @pytest.mark.parametrize(("part", "key", "value"), [("plan", "accuracy", 0.01), ("height", "count", 31)])

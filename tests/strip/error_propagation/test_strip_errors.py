@@ -125,36 +125,3 @@ def test_covariances_are_products_of_derivatives(photos: int, lap: float, monkey
     along = np.einsum("ni,nic->nc", directions, points[some])
     expected = along @ along.T
     assert found.joint_covariance(some, directions) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
-def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
-    """A point whose middle measurement is wrong is placed by the outer two; its derivatives against differences."""
-    inputs = without_noise(spec(7, 62.0))
-    observations = inputs.observations
-    counts = np.bincount(observations.point)
-    point = int(np.flatnonzero(counts == 3)[5])
-    rows = np.flatnonzero(observations.point == point)
-    rows = rows[np.argsort(observations.photo[rows])]
-    xy = observations.xy.copy()
-    xy[rows[1]] += [0.3, 0.4]
-    inputs = replace(inputs, observations=replace(observations, xy=xy))
-    plain = Settings(adjustment="similarity")
-    result = triangulate(inputs, plain)
-    formed = result.strips[0].of_photos.formed
-    assert set(formed.bridging) == {rows[0], rows[2]}
-    found = fitted_strip(result)
-    errors, by_errors = found.errors, points_of(found)
-    place = int(np.searchsorted(formed.point, point))
-    for row in (rows[0], rows[2], int(np.flatnonzero(observations.photo == 3)[2])):
-        by_points, _ = differenced(result, (int(row), 1), 2e-4)
-        column = int(errors.image_columns(np.array(row))[1])
-        derivative = by_errors[place, :, column] / errors.sigma[row, 1]
-        assert derivative == pytest.approx(by_points[place], abs=CLOSE * np.abs(by_points).max())
-    precise = triangulate(inputs, Settings(adjustment=adjustment)).precision
-    assert precise is not None
-    sigma = np.sqrt(np.diagonal(precise.points, axis1=1, axis2=2))
-    ratio = sigma[place] / np.median(sigma, axis=0)
-    assert (ratio > 0.5).all()
-    assert (ratio < 3.0).all()

@@ -113,20 +113,6 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
     assert np.abs(again - ideal).max() < PICOMETRE
 
 
-def test_the_order_is_principal_point_distortion_refraction_curvature() -> None:
-    camera = replace(PLAIN, principal_point=(0.5, -0.3), distortion=brown(FORWARD, (3e-7, 0.0, 0.0)))
-    x, y = 100.5, -70.3
-    x, y = x - 0.5, y + 0.3
-    stretch = 1 + 3e-7 * (x * x + y * y)
-    x, y = x * stretch, y * stretch
-    shrink = 1 - 5e-5 * (1 + (x * x + y * y) / FOCAL**2)
-    x, y = x * shrink, y * shrink
-    stretch = 1 + 2e-4 * (x * x + y * y) / FOCAL**2
-    expected = [x * stretch, y * stretch]
-    found = corrections.undistort(np.array([[100.5, -70.3]]), camera, Bending(5e-5, 2e-4))
-    assert found[0] == pytest.approx(expected, abs=1e-12)
-
-
 @given(st.sampled_from([FORWARD, BACKWARD]), st.tuples(*[unit] * 7), st.floats(-100, 100), st.floats(-100, 100))
 def test_brown_is_the_formula_of_the_project_file(direction: str, c: tuple[float, ...], x: float, y: float) -> None:
     k1, k2, k3, p1, p2 = c[0] * 1e-6, c[1] * 1e-11, c[2] * 1e-16, c[3] * 1e-6, c[4] * 1e-6

@@ -19,7 +19,7 @@ from photostrip.strip.interior import InteriorOrientation
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     Marks = Mapping[str, Floats]
 
 DATA = Path(__file__).parents[2] / "data" / "interior"
-MICROMETRE = 1e-3  # mm
 PICOMETRE = 1e-9
 CORNERS = Camera(
     "RC30",
@@ -166,32 +165,6 @@ def test_sigma0_is_the_precision_of_the_marks() -> None:
     assert not found.notes
 
 
-def trapezoid(xy: Floats) -> Floats:
-    """A photo copied from a tilted print: 30 micrometres at the corners."""
-    return np.asarray(xy * (1 + 2.7e-6 * xy[..., :1]))
-
-
-def twist(xy: Floats) -> Floats:
-    """Film stretched in y, on the right side 30 micrometres more than in the middle."""
-    return np.asarray(xy * np.stack([np.ones(xy.shape[:-1]), 1 + 2.7e-6 * xy[..., 0]], -1))
-
-
-@pytest.mark.parametrize(("transform", "bent"), [("projective", trapezoid), ("bilinear", twist)])
-def test_what_an_affine_transformation_leaves_the_higher_ones_take(
-    transform: str, bent: Callable[[Floats], Floats]
-) -> None:
-    truth = np.random.default_rng(3).uniform(-100, 100, (50, 2))
-    marks = {"1": {name: bent(xy) for name, xy in calibrated(CORNERS).items()}}
-    affine, higher = orient(marks), orient(marks, transform=transform)
-    measured = points(("1",), bent(truth))
-    left = [np.abs(interior.transform(measured, found).xy - truth).max() for found in (affine, higher)]
-    assert left[0] > 20 * MICROMETRE
-    assert left[1] < 0.1 * MICROMETRE
-    assert (affine.redundancy[0], higher.redundancy[0]) == (2, 0)
-    assert affine.sigma0[0] > 10 * MICROMETRE
-    assert np.isnan(higher.sigma0[0])
-
-
 # --------------------------------------------------------------------------------------- how many marks
 
 
@@ -295,18 +268,6 @@ def test_two_exchanged_marks_are_found_and_named(camera: Camera, mirrored: bool,
     named = [f"with {x} and {y} exchanged" in message for x, y in ((a, b), (b, a))]
     assert message.startswith("photo 1: ")
     assert any(named), message
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("camera", CAMERAS)
-@given(seed=SEEDS)
-def test_a_mark_with_the_number_of_one_not_measured_is_found(camera: Camera, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    photos = {f"{i}": film(camera, rng) for i in range(3)}
-    wrong, missing = rng.choice(list(camera.fiducials), 2, replace=False)
-    photos["1"][wrong] = photos["1"].pop(missing)
-    (message,) = messages(photos, camera)
-    assert f"with {wrong} called {missing}" in message
 
 
 def test_a_photo_of_another_camera_is_refused_without_a_guess() -> None:

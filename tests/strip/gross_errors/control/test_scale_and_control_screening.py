@@ -12,6 +12,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.method import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
+from tests.much_wrong_control import two_fifths_wrong
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -108,3 +109,11 @@ def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> Non
     row_of = {name: row for row, name in enumerate(control.ids)}
     rows = [row_of[name] for name in kept.ids]
     assert np.array_equal(kept.use, control.use[rows] & ~bad[rows])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [21, 28, 41, 1560036])
+def test_two_fifths_of_the_control_are_found_wrong(seed: int) -> None:
+    """Suspected on the way: more than half, or a set that explains the misclosures not quite."""
+    wrong, named, others = two_fifths_wrong(seed)
+    assert (named, others) == (wrong, 0)

@@ -11,10 +11,8 @@ import pytest
 from photostrip.formats.text.findings import Findings
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, schema_of
-from photostrip.project.schema.ground import Output
-from photostrip.project.schema.processing import Processing
-from photostrip.project.schema.project_file import ProjectFile, Tolerances
-from photostrip.project.schema.sections import Section
+from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances
+from photostrip.project.sections import Section
 from photostrip.project.yaml.reading import checked, homes
 from photostrip.project.yaml.tree import Node, Place, parse
 from tests.loops import nonempty
