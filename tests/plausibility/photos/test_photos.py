@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photostrip.plausibility import flight_order, units
+from photostrip.plausibility import flight_order, mosaic, units
 from photostrip.points import PhotoPoints
 from photostrip.simulation import Flight, Spec, simulate
 
@@ -73,3 +74,22 @@ def test_a_wrong_unit_of_all_coordinates_is_named(factor: float, word: str) -> N
     assert finding.code == "P101"
     assert word in finding.message
     assert factors == {made.camera.name: pytest.approx(1 / factor)}
+
+
+def test_one_photo_listed_far_from_its_place_is_named_alone() -> None:
+    made = simulation()
+    photos = list(made.strips[0][1])
+    wrong = [*photos[:1], *photos[2:], photos[1]]
+    (finding,) = found(made.observations, wrong)
+    assert (finding.code, finding.photos) == ("P201", (photos[1],))
+    assert f"between {photos[0]} and {photos[2]}" in finding.message
+
+
+def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
+    """Four photos, one base apart along x, listed in the order 2, 0, 3, 1; photo 4 is not in the list."""
+    links = SimpleNamespace(
+        photo=np.array([[2, 0], [0, 3], [3, 1], [4, 2]]),
+        bases=(np.array([1.0, 1.0, 1.0, 5.0]) + 0j, -np.array([1.0, 1.0, 1.0, 5.0]) + 0j),
+        count=np.array([6, 6, 6, 6]),
+    )
+    assert flight_order._steps(cast("mosaic.PhotoLinks", links), [2, 0, 3, 1]) == pytest.approx([1.0] * 4)
