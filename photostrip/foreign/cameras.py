@@ -11,7 +11,7 @@ from photostrip.foreign.adjusted import Adjusted, require_squares
 from photostrip.foreign.project import camera_in_pixels, in_project
 from photostrip.notes import Document
 from photostrip.project.resolved import yaml_text
-from photostrip.project.schema.sections import Text
+from photostrip.project.sections import Text
 from photostrip.strip.pixel_cameras import CONVENTIONS, in_pixels
 
 

@@ -10,7 +10,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.foreign import cameras, colmap_model, geopackage, historix_submission, opensfm_model, orthority
 from photostrip.foreign.adjusted import adjusted
 from photostrip.notes import Document
-from photostrip.project.schema.exports import ENDINGS, form_of
+from photostrip.project.keys import ENDINGS, form_of
 from photostrip.strip.pixel_cameras import CONVENTIONS
 
 WRITERS = {

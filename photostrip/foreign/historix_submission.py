@@ -22,7 +22,7 @@ from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles
 from photostrip.notes import counted, listed
-from photostrip.project.schema.exports import ENDINGS
+from photostrip.project.keys import ENDINGS
 
 LENS = ("k1", "k2", "k3", "p1", "p2")
 DEGREES, METRES = 1e-9, 1e-4  # steps of the coordinates in a point cloud

@@ -21,7 +21,7 @@ from photostrip.foreign.opensfm import POINT
 from photostrip.formats.output.result_json import on_one_line as text
 from photostrip.geodesy.ground_frame import true_axes
 from photostrip.notes import Document, counted
-from photostrip.project.schema.exports import ENDINGS
+from photostrip.project.keys import ENDINGS
 
 DISTORTION = ("k1", "k2", "k3", "p1", "p2")
 TRACKS = "tracks.csv"

@@ -17,7 +17,7 @@ from photostrip.geometry.rotation import separable_angles
 from photostrip.notes import counted
 from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
 from photostrip.project.resolved import yaml_text
-from photostrip.project.schema.sections import Text
+from photostrip.project.sections import Text
 from photostrip.strip.lens_distortion import shift
 from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
 

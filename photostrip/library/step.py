@@ -24,7 +24,7 @@ from photostrip.library import steps
 from photostrip.library.step_arguments import Rays, of_rays, sigma0_of
 from photostrip.library.steps import Bundle, Strip, one_pair
 from photostrip.project import steps as keys
-from photostrip.project.schema.sections import Section
+from photostrip.project.sections import Section
 from photostrip.project.yaml.reading import read_keys
 from photostrip.report.page.parts import DASH, Facts
 from photostrip.sheets.replay import first_rounds

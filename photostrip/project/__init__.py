@@ -5,7 +5,7 @@ metres, east, north, up. All faults of all files are reported at once, each with
 
 - ``yaml/``: text to a tree of texts with places, presets (``extends``), overrides (``--set``), faults; ``references``:
   what the values of a project owe each other;
-- ``schema/``: every key with its unit and default; ``sections``: how mappings and values are read;
+- ``keys``: every key of a project with its unit and default; ``sections``: how mappings and values are read;
 - ``loading``: a strip project, in order: ``tables`` and ``models`` read what it names, ``conversion`` brings units,
   axes and rotations into those of the program, ``hints`` says what is not used, ``resolved`` writes the project with
   nothing left open, ``places`` finds where a finding would be put right; ``in_memory`` takes projects without files;

@@ -25,11 +25,22 @@ from photostrip.geometry.rotation import about, angle_rates, angles, from_angles
 from photostrip.notes import Note, counted
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints, concatenated
-from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPhoto, PixelCamera
-from photostrip.project.schema.ground import CameraPositions as PositionsBlock
-from photostrip.project.schema.ground import Control, Ellipsoid, GivenAngles, GivenList, Orientations, Output
-from photostrip.project.schema.project_file import ProjectFile
-from photostrip.project.schema.sections import Section
+from photostrip.project.keys import (
+    AUTO,
+    Camera,
+    Control,
+    Distortion,
+    Ellipsoid,
+    FirstPhoto,
+    GivenAngles,
+    GivenList,
+    Orientations,
+    Output,
+    PixelCamera,
+    ProjectFile,
+)
+from photostrip.project.keys import CameraPositions as PositionsBlock
+from photostrip.project.sections import Section
 from photostrip.project.yaml.tree import Node
 from photostrip.strip import fiducial_marks, formed_strip
 from photostrip.strip.fiducial_marks import Certificate
@@ -39,8 +50,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
-    from photostrip.project.schema.processing import Processing
-    from photostrip.project.schema.project_file import ProjectFile
+    from photostrip.project.keys import Processing, ProjectFile
 
 T = TypeVar("T", bound="DataclassInstance")
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}

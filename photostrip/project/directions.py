@@ -23,7 +23,7 @@ from photostrip.project.phototheodolites import (
     CameraOrName,
     refuse_outside,
 )
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     FirstSchema,
     Flag,

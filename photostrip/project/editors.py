@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, get_origin
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from photostrip.project.schema.sections import AUTO, Section, bare, is_section
+from photostrip.project.sections import AUTO, Section, bare, is_section
 
 if TYPE_CHECKING:
     from pydantic_core import core_schema
 
 KINDS = {  # where the keys of each kind of file stand, and its title
-    "project": ("schema.project_file", "ProjectFile", "photostrip project"),
+    "project": ("keys", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
     "tolerances": ("tolerances", "ToleranceFile", "photostrip tolerance profile"),
     "model": ("plans", "ModelPlanFile", "photostrip plan model"),
@@ -90,7 +90,7 @@ class _ForEditors(GenerateJsonSchema):
 
 def single_keys(kind: type[Section] | None = None, above: str = "") -> Iterator[str]:
     """Return the paths of all single values of a project file; below lists and names of users there are none."""
-    from photostrip.project.schema.project_file import ProjectFile
+    from photostrip.project.keys import ProjectFile
 
     for name, field in (kind or ProjectFile).model_fields.items():
         inner = bare(field.annotation)

@@ -27,13 +27,12 @@ from photostrip.points import PhotoPoints
 from photostrip.project import conversion
 from photostrip.project.conversion import with_pixel_sizes
 from photostrip.project.hints import hints
+from photostrip.project.keys import Camera as CameraBlock
+from photostrip.project.keys import CameraPositions as CameraPositionsBlock
+from photostrip.project.keys import Control, GivenList, Orientations, Output, ProjectFile
 from photostrip.project.models import check_models, measured_models
 from photostrip.project.places import ListedPoints, listed_points, of_points, places_of
 from photostrip.project.resolved import completed, text_of
-from photostrip.project.schema.cameras import Camera as CameraBlock
-from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
-from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
-from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.tables import Tables, check_tables, in_one_zone, measured_photos, read_tables
 from photostrip.project.yaml.reading import Reading, valid_section
 from photostrip.project.yaml.references import check_references

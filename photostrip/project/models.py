@@ -16,7 +16,7 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.notes import counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
-from photostrip.project.schema.measurements import Models
+from photostrip.project.keys import Models
 from photostrip.project.yaml.reading import form_of
 from photostrip.project.yaml.references import listed_photos
 from photostrip.project.yaml.tree import Node, fault_at

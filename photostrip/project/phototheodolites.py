@@ -10,7 +10,7 @@ import numpy as np
 
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.tables import Table
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     Before,
     FirstSchema,
@@ -40,7 +40,6 @@ IMAGE_SIGMA = Range(1e-6, 10.0, "mm")
 IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
 DIRECTION_SIGMA = Range(1e-4, 36_000.0, "″")
 DEGREES = Range(-1000.0, 1000.0, "deg")
-GON = Range(-1000.0, 1000.0, "gon")
 POSITION = Range(-1e8, 1e8, "m")
 BASE = Range(1e-3, 1e6, "m")
 DISTANCE = Range(1e-2, 1e6, "m")

@@ -19,10 +19,10 @@ from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, Mode
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
 from photostrip.project.conversion import distortion_of
+from photostrip.project.keys import Distortion
 from photostrip.project.phototheodolites import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
 from photostrip.project.phototheodolites import Camera as Phototheodolite
-from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     Before,
     FirstSchema,

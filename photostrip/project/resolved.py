@@ -11,10 +11,8 @@ import yaml
 from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
-from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.ground import Ellipsoid
-from photostrip.project.schema.project_file import ProjectFile
-from photostrip.project.schema.sections import Section, Text
+from photostrip.project.keys import Distortion, Ellipsoid, ProjectFile
+from photostrip.project.sections import Section, Text
 from photostrip.project.yaml.reading import path_of
 from photostrip.project.yaml.tree import Node
 

@@ -15,10 +15,8 @@ from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.conversion import distortion_of, semi_axes
-from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid
-from photostrip.project.schema.measurements import Unit
-from photostrip.project.schema.sections import (
+from photostrip.project.keys import CRS, UNDULATION, Distortion, Ellipsoid, Unit
+from photostrip.project.sections import (
     After,
     Axes,
     Before,

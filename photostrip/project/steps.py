@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     FirstSchema,
     Flag,

@@ -28,7 +28,7 @@ from photostrip.project.phototheodolites import (
     known_presets,
     phototheodolite,
 )
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     Axes,
     Before,

@@ -27,8 +27,8 @@ from photostrip.formats.text.numbers import number as read_number
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
+from photostrip.project.keys import Control
 from photostrip.project.models import ModelTables, model_tables, read_model_points
-from photostrip.project.schema.ground import Control
 from photostrip.project.yaml.reading import Reading, form_of
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
 from photostrip.project.yaml.tree import Node, fault_at

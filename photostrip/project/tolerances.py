@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import LARGEST_NUMBER
-from photostrip.project.schema.sections import (
+from photostrip.project.sections import (
     After,
     Flag,
     NotNegative,

@@ -87,7 +87,7 @@ def test_residuals_stand_where_the_points_were_measured(frame: str) -> None:
 
 def test_points_have_their_differences_as_hints() -> None:
     """Also the one of which only the height was given."""
-    document = copy.deepcopy(saved())
+    document = by_rows(saved())
     of_height = document["control"][0] | {"dx": None, "dy": None, "plan": None}
     document["control"][0] = of_height
     assert of_height["measured"]

@@ -21,7 +21,7 @@ from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.writing import write_files
-from photostrip.project.schema.exports import TABLES, form_of
+from photostrip.project.keys import TABLES, form_of
 from photostrip.project.template import refuse_existing
 from photostrip.result.statement.edited import EDITED, FIX, OF_WORDS, faults_of_edited, is_edited
 

@@ -19,7 +19,7 @@ from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.table_reader import WORDS
 from photostrip.formats.text.table_text import Form
 from photostrip.notes import counted
-from photostrip.project.schema.sections import Section, WrongValueError, bare, is_section, kinds_of, wrong
+from photostrip.project.sections import Section, WrongValueError, bare, is_section, kinds_of, wrong
 from photostrip.project.yaml.tree import (
     COMMAND_LINE,
     NO_FILES,

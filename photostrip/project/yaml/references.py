@@ -12,7 +12,7 @@ from photostrip.errors import Fault
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.pipeline.inputs import AUTO, BUNDLE
-from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.keys import ProjectFile
 from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
 
 LEAST_MARKS = 2

@@ -21,8 +21,6 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
-
-
 MATRIX = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))  # of a rotation, by rows
 
 

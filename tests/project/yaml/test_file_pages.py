@@ -10,7 +10,7 @@ import pytest
 from photostrip.formats.measured.control import read_control
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings
-from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.keys import ProjectFile
 from photostrip.project.yaml.reading import checked
 from photostrip.project.yaml.tree import parse
 from tests.pages import blocks

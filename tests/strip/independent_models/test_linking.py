@@ -137,3 +137,14 @@ def test_a_mirrored_model_is_named(models: tuple[str, ...]) -> None:
         formed_of(replace(measured, xyz=xyz))
     assert told.value.faults[0].code == "mirrored-model"
     assert ", ".join(models) in told.value.faults[0].message
+
+
+def test_points_on_a_line_need_the_center() -> None:
+    true = truth(2, 3, 3)
+    points = true.points.copy()
+    points[3:6] = [[900.0, y, 0.0] for y in (-700.0, 0.0, 700.0)]
+    measured = replace(true, points=points).measured()
+    assert formed_of(measured).links.shared.count == 1
+    with pytest.raises(GeometryError, match=r"lie on one line.*with the common perspective centre") as told:
+        formed_of(without(measured, (true.node >= len(true.points)) & (true.model == 1)))
+    assert told.value.code == "link-on-a-line"

@@ -168,3 +168,15 @@ def test_the_automatic_limit_is_four_sigma_of_a_parallax() -> None:
     _, log = screened(oriented, RelativeSettings("parallax+grubbs", parallax_limit=10.0), SIGMA)
     assert log[0].test == "grubbs"
     assert log[0].limit == pytest.approx(grubbs_limit(16, 0.05))
+
+
+@pytest.mark.parametrize("method", ["parallax+grubbs", "tau"])
+def test_a_pair_keeps_six_points(method: str) -> None:
+    truth = clean(10, points=(2, 1, 2, 1, 1, 1))
+    errors = {row: 3.0 * (-1) ** row for row in range(0, 8, 2)}
+    found, log = screened(spoiled(truth, errors), RelativeSettings(method, 0.2, 0.001), SIGMA)
+    assert found.points_used[0] >= 6
+    assert len(log) <= 2
+    six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
+    found, log = screened(six, RelativeSettings(method, 0.2, 0.001), SIGMA)
+    assert log == ()

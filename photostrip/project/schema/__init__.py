@@ -1,1 +1,0 @@
-"""The keys of the YAML files: what each may be, its unit, its default."""
