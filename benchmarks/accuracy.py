@@ -89,11 +89,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one strip: mean squares (3,) and degrees in plan and height of each choice; points per model."""
+    """What became of one strip: mean squares (3,) and degrees in plan and height of each choice."""
 
     squares: dict[str, Floats]
     degrees: dict[str, tuple[int, int]]
-    per_model: float
 
 
 def run(task: Task) -> Outcome:
@@ -108,8 +107,7 @@ def run(task: Task) -> Outcome:
         result = triangulate(inputs, chosen)
         squares[choice] = mean_squares(simulation, result, result.points.cartesian)
         degrees[choice] = _degrees(result)
-    pairs = result.strips[0].of_photos.orientation.pairs
-    return Outcome(squares, degrees, len(pairs.pair) / pairs.size)
+    return Outcome(squares, degrees)
 
 
 def mean_squares(simulation: Simulation, result: Result, found: Floats) -> Floats:
@@ -141,7 +139,6 @@ class Measured:
     rms: Floats
     doubt: Floats
     degrees: Counter[tuple[int, int]]
-    per_model: float
 
     @property
     def plan_height(self) -> Floats:
@@ -171,7 +168,7 @@ def measure(pool: Pool, spec: Spec, seeds: int, choices: Iterable[str]) -> dict[
         rms = np.sqrt(squares.mean(axis=0))
         doubt = squares.std(axis=0, ddof=1) / np.sqrt(seeds) / (2.0 * rms)
         degrees = Counter(outcome.degrees[choice] for outcome in outcomes if choice in outcome.degrees)
-        found[choice] = Measured(rms, doubt, degrees, float(np.mean([outcome.per_model for outcome in outcomes])))
+        found[choice] = Measured(rms, doubt, degrees)
     return found
 
 
@@ -223,10 +220,10 @@ def case_a(pool: Pool, seeds: int) -> None:
         for _, _, choice, limits in (case for case in CASES_A if case[:2] == (models, bands)):
             of, limit = found[choice], np.array(limits)
             values, doubt = of.rms / SIGMA, of.doubt / SIGMA
-            head = (f"{models} models, {bands} bands", f"{of.per_model:.1f}", TITLES[choice], slashed(limits, 1))
+            head = (f"{models} models, {bands} bands", TITLES[choice], slashed(limits, 1))
             tail = (slashed(values / limit), verdict(values, doubt, limit))
             rows.append((*head, slashed(values), slashed(doubt), *tail, slashed(found[BUNDLE].rms / SIGMA)))
-    table(("strip", "per model", "adjustment", "limit", "measured", "s.e.", "ratio", "below", "bundle"), rows)
+    table(("strip", "adjustment", "limit", "measured", "s.e.", "ratio", "below", "bundle"), rows)
 
 
 def case_b(pool: Pool, seeds: int) -> None:
@@ -244,10 +241,10 @@ def case_b(pool: Pool, seeds: int) -> None:
         of, limit = found[choice], np.array(limits)
         values, doubt = of.plan_height, of.plan_height_doubt
         below = "-" if choice == BUNDLE else verdict(values, doubt, limit)
-        head = (TITLES[choice], f"{of.per_model:.1f}", slashed(limits, 3), slashed(values, 3), slashed(doubt, 3))
+        head = (TITLES[choice], slashed(limits, 3), slashed(values, 3), slashed(doubt, 3))
         tail = (slashed(limit / LIMITS_B[BUNDLE]), slashed(values / found[BUNDLE].plan_height))
         rows.append((*head, slashed(values / limit), below, *tail))
-    heads = ("adjustment", "per model", "limit", "measured", "s.e.", "ratio", "below")
+    heads = ("adjustment", "limit", "measured", "s.e.", "ratio", "below")
     table((*heads, "limit/bundle", "measured/bundle"), rows)
 
 

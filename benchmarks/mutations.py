@@ -144,10 +144,9 @@ def tests_of(change: Change) -> list[str]:
 
 def first_failure(tree: Path, tests: Sequence[str]) -> str:
     """Run tests that are not slow in `tree` (all when none is named), give the first that fails, or nothing."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": ""}  # empty: as if it were not set
     options = ["-x", "-q", "-m", "not slow", "--tb=no", "-p", "no:cacheprovider"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
-    environment |= {"PYTHONPATH": str(tree)}
     try:
         done = subprocess.run(
             command, cwd=tree, env=environment, capture_output=True, text=True, timeout=LIMIT, check=False

@@ -5,7 +5,7 @@ process is timed in seconds of computing, reading and writing included, by a sma
 of this program counts for it. The unit is L, a bare ``import numpy, yaml, pyproj``, timed in turn with the rows: a busy
 machine makes both slower. Of several repetitions the fastest counts.
 
-Usage: python benchmarks/strip.py [--rows NAME ...] [--sizes N ...] [--adjustment METHOD] [--repeat N]
+Usage: python benchmarks/strip.py [--rows NAME ...] [--sizes N ...] [--repeat N]
 """
 
 from __future__ import annotations
@@ -37,7 +37,6 @@ UNIT = "import numpy, yaml, pyproj"
 EXPONENT = 1.05  # at most, of whole runs from the first to the last of the sizes
 GROWTH_SCALE = 1500.0  # of the strips that grow: 10 000 photos are 1300 km
 FAILED = 1  # exit code of a run whose verdict is that: all work is done
-METHODS = ("polynomial", "bundle")
 
 LAUNCHER = """
 import json, resource, subprocess, sys
@@ -63,10 +62,7 @@ class Row:
 
 
 def strip_spec(photos: int, every: int, *, scale: float = 5000.0) -> Spec:
-    """Give a film strip to the north with 30 points on a photo: 3000 photos 1:5000 are 1300 km.
-
-    every: models from one band of three control points to the next.
-    """
+    """Give a film strip with 30 points on a photo and a band of three control points every so many models."""
     return Spec(
         name=f"{photos} photos",
         flight=Flight(photos=photos, end_lap_percent=62.0, heading_deg=0.0, scale=scale),
@@ -82,13 +78,11 @@ BLOCK = Spec(
     control=Control(check=100),
     gnss=Gnss(use=True),
 )
-DENSE, SPARSE = strip_spec(1000, 5), strip_spec(1000, 200)
+DENSE = strip_spec(1000, 5)
 ROWS = {
     "short": Row("20 photos", strip_spec(20, 5), 5.0),
     "dense": Row("1000 photos, band every 5 models, polynomial", DENSE, 8.0, 200.0),
-    "sparse": Row("1000 photos, band every 200 models, polynomial", SPARSE, 8.0, 200.0),
     "dense-bundle": Row("1000 photos, every 5, bundle", DENSE, 12.0, 210.0, adjustment="bundle"),
-    "sparse-bundle": Row("1000 photos, every 200, bundle", SPARSE, 12.0, 210.0, adjustment="bundle"),
     "long": Row("3000 photos, band every 600 models", strip_spec(3000, 600), 20.0, 400.0),
     "block": Row("bundle block 10 x 40 with GNSS", BLOCK, adjustment="bundle"),
     "check": Row("check of 1000 photos", DENSE, 4.0, command="check"),
@@ -164,14 +158,14 @@ def print_rows(folder: Path, names: Sequence[str], repeat: int) -> None:
     print(f"{'L: ' + UNIT:<50}{min(units):>9.2f}\n", flush=True)
 
 
-def print_growth(folder: Path, sizes: Sequence[int], repeat: int, adjustment: str) -> None:
+def print_growth(folder: Path, sizes: Sequence[int], repeat: int) -> None:
     """Print how the time grows with the number of photos, six bands of control on each."""
     print(f"{'photos':>8}{'whole run':>12}{'memory':>10}")
     whole = []
     for photos in sizes:
         spec = strip_spec(photos, max(photos // 5, 1), scale=GROWTH_SCALE)
         project = write_project(folder / str(photos), spec)
-        spent = whole_run(project, Row("", spec, adjustment=adjustment), repeat)
+        spent = whole_run(project, Row("", spec), repeat)
         whole.append(spent.units)
         print(f"{photos:>8}{spent.units:>10.1f} L{spent.megabytes:>7.0f} MB", flush=True)
     exponent = float(np.polyfit(np.log(sizes), np.log(whole), 1)[0])
@@ -183,14 +177,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("--rows", nargs="*", choices=ROWS, default=list(ROWS), help="whole processes (default all)")
     parser.add_argument("--sizes", type=int, nargs="*", default=[300, 1000, 3000], help="sizes for the growth")
-    parser.add_argument("--adjustment", choices=METHODS, default=METHODS[0], help="method of the strips that grow")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions, of which the fastest counts (default 3)")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         if options.rows:
             print_rows(Path(name), options.rows, options.repeat)
         if options.sizes:
-            print_growth(Path(name), options.sizes, options.repeat, options.adjustment)
+            print_growth(Path(name), options.sizes, options.repeat)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from photostrip.network.cofactors import Correlation
     from photostrip.network.problem import BundleProblem
     from photostrip.network.snooping import ScreenedBundle
-    from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights
     from photostrip.strip import corrections, pair_screening
     from photostrip.strip import resection as exterior
     from photostrip.strip.control_screening import ScreenedControl
@@ -92,7 +91,6 @@ class StripResult:
     notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
     # control coordinates that were not used; ``control`` says so in its ``use``
     screened_control: ScreenedControl
-    shared: StretchedHeights | ShiftedList | None = None  # by all control, found before points were tested one by one
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
 

@@ -146,7 +146,6 @@ class WorkedExample:
     eq6: float
     factor: float  # the factor 1 + x^2/f^2 of the camera
     vertical: float  # m_beta, exact
-    returned_z: float  # what z comes back as, when beta is computed by eq. 3 as printed and put into eq. 2, mm
 
 
 def worked(example: Example) -> WorkedExample:
@@ -163,7 +162,6 @@ def worked(example: Example) -> WorkedExample:
         eq6=float(printed.vertical_eq6) * ARCSECONDS,
         factor=factor,
         vertical=float(exact.vertical) * ARCSECONDS,
-        returned_z=z * factor,  # tan(beta) = z sec/f, and eq. 2 multiplies by f sec again
     )
 
 

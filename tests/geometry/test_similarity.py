@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.geometry.similarity import Similarity, Spread, collinearity, similarity_derivatives
+from photostrip.geometry.similarity import Similarity, Spread, collinearity, similar, similarity_derivatives
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -89,6 +89,13 @@ def test_an_optimiser_finds_the_same(seed: int) -> None:
     assert found.scale == pytest.approx(theirs.scale, rel=OPTIMISER)
     assert np.allclose(found.rotation, theirs.rotation, rtol=0, atol=OPTIMISER)
     assert np.allclose(found(source), theirs(source), rtol=0, atol=OPTIMISER * truth.scale * 100)
+
+
+def test_many_at_once_are_what_each_is_alone() -> None:
+    rng = np.random.default_rng(1)
+    source, target, points = rng.normal(0, 1, (4, 5, 3)), rng.normal(9, 3, (4, 5, 3)), rng.normal(0, 2, (6, 3))
+    alone = [Similarity.from_points(one, other)(points) for one, other in zip(source, target, strict=True)]
+    assert np.allclose(similar(source, target, points), alone, rtol=0, atol=1e-12)
 
 
 # ------------------------------------------------------------------------------------------ invariants

@@ -10,7 +10,7 @@ import pytest
 
 from photostrip.formats.text.findings import Findings
 from photostrip.pipeline.inputs import Settings
-from photostrip.project.editors import schema_of
+from photostrip.project.editors import KINDS, schema_of
 from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances
 from photostrip.project.sections import Section
 from photostrip.project.yaml.reading import checked, homes
@@ -52,6 +52,13 @@ def test_every_key_is_described() -> None:
     found = every_key()
     assert len(found) > 60
     assert [name for name, each in found if not each.get("description")] == []
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_every_kind_of_file_has_a_schema_with_a_description_of_each_key(kind: str) -> None:
+    schema = schema_of(kind)
+    assert schema["title"] == KINDS[kind][2]
+    assert [name for name, each in nonempty(schema["properties"].items()) if not each.get("description")] == []
 
 
 def test_units_stand_in_the_description_and_by_themselves() -> None:

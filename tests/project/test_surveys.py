@@ -235,7 +235,6 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("name: quarry", "nmae: quarry", "survey.yaml:2:1: nmae: the key `nmae` is not known; did you mean `name`?"),
         ("terrestrial: 1", "terrestrial: 2", "survey.yaml:1:25: photostrip_terrestrial: `2` is not known; expected 1"),
         ("camera: long", "camera: lnog", "survey.yaml:8:18: stations.left.camera: there is no camera `lnog`; expected one of long, wide; did you mean `long`?"),
         ("preset: UMK 10/1318", "preset: UMK 10", "survey.yaml:5:18: cameras.wide.preset: there is no preset `UMK 10`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `UMK 10/1318`?"),
@@ -246,23 +245,17 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
         ("axes: [east, north, up]", "axes: [east, north, up]\nbase: 40", "survey.yaml:7:7: base: the base follows from the positions of the stations; remove it"),
         ("position: [1000.0, 2000.0, 150.0], ", "", "survey.yaml:8:9: stations.left: `alpha` is given and `position` is not; expected both, or neither in the normal case"),
         ("150.0]", "150.0m]", "survey.yaml:8:51: stations.left.position[2]: `150.0m` has a unit in it; expected a number; write the number alone: 150.0"),
-        ("150.0]", "]", "survey.yaml:8:34: stations.left.position: 2 values in the list; expected 3 values"),
-        ("camera: wide, ", "", "survey.yaml:9:10: stations.right.camera: `camera` is missing; expected camera, a key of `cameras`"),
-        ("axes:", "angle_unit: degrees\naxes:", "survey.yaml:6:13: angle_unit: `degrees` is not known; expected one of deg, gon"),
         ("time: 1}", "time: 3}", "survey.yaml:10:78: epochs[2].time: the time 2 is not later than that of the epoch before, 3; expected ascending times"),
         ("{id: epoch 1, time: 1}", "epoch 1", "survey.yaml:10:34: epochs[1]: the epoch has no time, others have; give all epochs a time, or none"),
         ("id: epoch 1,", "id: epoch 3,", "survey.yaml:10:34: epochs[1]: coordinates.csv has no measurement of epoch epoch 3; did you mean `epoch 1`?"),
         ("id: epoch 1,", "id: epoch 0,", "survey.yaml:10:9: epochs: epoch epoch 0 is named 2 times; remove one"),
         ("P5]", "P55]", "survey.yaml:12:30: stable[5]: coordinates.csv has no point P55; did you mean `P5`?"),
-        ("unit: mm", "unit: px", "survey.yaml:11:52: measurements.unit: `px` is not known; expected one of mm, um"),
         (", sigma: 0.005", "", "coordinates.csv:2: sx: 72 rows have no standard deviation (sx, sz), and none is given for all; set `measurements.sigma` in the project, or fill the column sx, sz"),
         ("sigma: 0.005", "sigma: 0.005, sigma_d: 1", "survey.yaml:11:79: measurements.sigma_d: coordinates have no pseudo-parallaxes that could have a standard deviation; remove it; use `sigma`"),
         ("coordinates: coordinates.csv, ", "", "survey.yaml:11:15: measurements: no table is named; expected either `coordinates` or `pseudo_parallaxes`"),
         ("coordinates: c", "pseudo_parallaxes: p.csv, coordinates: c", "survey.yaml:11:15: measurements: two tables are named; expected either `coordinates` or `pseudo_parallaxes`"),
         ("coordinates.csv", "coordinate.csv", "survey.yaml:11:29: measurements.coordinates: coordinate.csv does not exist; did you mean `coordinates.csv`?"),
         ("name: quarry", "presets: mine.yaml", "survey.yaml:2:10: presets: mine.yaml does not exist"),
-        ("stable:", "processing: {significance: 1.5}\nstable:", "survey.yaml:12:28: processing.significance: 1.5 is out of range; expected 1e-06 to 0.5"),
-        ("stable:", "processing: {moved_camera: sometimes}\nstable:", "survey.yaml:12:28: processing.moved_camera: `sometimes` is not known; expected one of always, auto, never"),
     ],
 )  # fmt: skip
 def test_every_wrong_value_is_told_with_its_place(tmp_path: Path, old: str, new: str, expected: str) -> None:

@@ -168,10 +168,6 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if not any(each.is_error or each.code == ALIKE for each in findings):  # a camera explains much of misread control
         explained = {each.key for each in causes if each.key}
         findings = [each for each in findings if each.key not in explained] + causes
-    shown = {each.strip.id for each in doubtful}
-    findings += shared_errors.find_shared_errors(
-        [each for each in stages if each.strip.id in shown], findings, joined=result.bundle is not None
-    )
     if not any(each.is_error for each in findings):
         findings += shared_errors.find_shifted_checks(result)
     return _told(findings, inputs, settings)

@@ -189,7 +189,7 @@ def _tested(result: Result) -> Flags:
     if result.bundle is None and (settings.links if result.model_strips else settings.relative).screening != "none":
         for strip in result.strips:
             rows = locate(strip.control.ids, control.ids)
-            tested[rows] |= np.isfinite(strip.screened_control.redundancy) | (strip.shared is not None)
+            tested[rows] |= np.isfinite(strip.screened_control.redundancy)
     doubtful = {name for note in result.notes if note.code == "control-doubtful" for name in note.points}
     tested[[name in doubtful for name in control.ids]] = False
     return tested

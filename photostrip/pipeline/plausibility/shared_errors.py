@@ -41,11 +41,11 @@ from photostrip.network.reliability import CONTROL, Parameter
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.plausibility.on_control import OnControl
-from photostrip.pipeline.results import Bundle, Result, StripResult
+from photostrip.pipeline.results import Bundle, Result
 from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
-from photostrip.plausibility.finding import CAUSES, ERROR, Evidence
+from photostrip.plausibility.finding import CAUSES, Evidence
 from photostrip.plausibility.shared_by_control import Shared, ShiftedList, StretchedHeights, find_shared, significant
 from photostrip.points import ControlPoints
 
@@ -60,37 +60,19 @@ OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
 
 
-def find_shared_errors(
-    strips: Sequence[StripResult], findings: Sequence[Finding], *, joined: bool = False
-) -> Iterator[Finding]:
-    """Name what the control of strips shares (P105, P107, P404, P407).
-
-    findings: what was found before: a strip whose distance is named already, or whose control is misread, is not named.
-    joined: whether a bundle has adjusted the strips, and tested control point by point after all.
-    """
-    then = "" if joined else "; no control was tested by itself"
-    if any(each.severity == ERROR and each.key.startswith("control[") for each in findings):
-        return  # a list that is misread
-    misread = {name for each in findings if each.severity == ERROR for name in each.strips}
-    for each in strips:
-        if each.shared is not None and each.strip.id not in misread:
-            photos = each.of_photos.strip if each.photo_stages else None
-            yield from _named(each.shared, each.control, each.strip.id, photos, then)
-
-
 def of_formed(laid: OnControl, stage: FormedPhotos | LinkedModels) -> list[Finding]:
     """Name what the control of a strip shares that is formed, and not adjusted."""
     shared = find_shared(laid.counted)
     photos = stage.strip if isinstance(stage, FormedPhotos) else None
-    return [] if shared is None else list(_named(shared, laid.counted.control, stage.strip.id, photos, ""))
+    return [] if shared is None else list(_named(shared, laid.counted.control, stage.strip.id, photos))
 
 
-def _named(shared: Common, control: ControlPoints, strip: str, photos: Strip | None, then: str) -> Iterator[Finding]:
+def _named(shared: Common, control: ControlPoints, strip: str, photos: Strip | None) -> Iterator[Finding]:
     """Name what the control of a strip shares; photos: the strip where it is one of photos, which have a camera."""
     if isinstance(shared, ShiftedList):
-        yield shifted_list(shared, control, f"strip {strip}", (strip,), then)
+        yield shifted_list(shared, control, f"strip {strip}", (strip,), "")
     elif photos is not None:
-        yield _stretched(photos, shared, then)
+        yield _stretched(photos, shared)
 
 
 def shifted_list(shared: ShiftedList, control: ControlPoints, whose: str, strips: Sequence[str], then: str) -> Finding:
@@ -169,13 +151,13 @@ def other_distance(
     return found(code, message, fix, evidence, strips=strips, key=f"cameras.{camera.name}.principal_distance")
 
 
-def _stretched(strip: Strip, stretch: StretchedHeights, then: str) -> Finding:
+def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
     given, factor = strip.camera.principal_distance, 1.0 / (1.0 + stretch.share)
     sigma = given * stretch.sigma * factor**2
     message = (
         f"the heights of strip {strip.id} are stretched by {100 * stretch.share:+.2f} % against its control, as by a "
         f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
-        f"{given:g} mm is given{then}"
+        f"{given:g} mm is given"
     )
     numbers: Evidence = {"heights_stretched": stretch.share, "standard_deviation_mm": sigma}
     return other_distance(strip.camera, given * factor, message, FIX, numbers, (strip.id,))

@@ -27,7 +27,7 @@ from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights, find_shared
+from photostrip.plausibility.shared_by_control import find_shared
 from photostrip.points import ControlPoints
 from photostrip.strip import absolute_orientation, control_screening, fitted_strip, strip_errors
 from photostrip.strip.control_screening import EITHER, WRONG_IMAGE, ScreenedControl
@@ -261,7 +261,6 @@ class ScreenedPhotos:
 
     photos: OrientedPhotos
     screened_control: ScreenedControl
-    shared: StretchedHeights | ShiftedList | None = None  # by all control, found before points were tested one by one
 
 
 def orient_on_control(
@@ -305,8 +304,8 @@ def reject_wrong_control(photos: OrientedPhotos) -> ScreenedPhotos:
     """
     stage, oriented, control = photos.stage, photos.oriented, photos.oriented.control
     place = strip_at_control(oriented, photos.control_rays(), photos.misclosure_covariance())
-    if shared := find_shared(place):  # single points prove nothing then
-        return ScreenedPhotos(photos, control_screening.not_screened(control), shared)
+    if find_shared(place):  # by all control, or a list: single points prove nothing then
+        return ScreenedPhotos(photos, control_screening.not_screened(control))
     screened = control_screening.screen_control(place)
     images = {control.ids[each.row]: each for each in screened.rejections if each.cause in {WRONG_IMAGE, EITHER}}
     kept = screened.kept
@@ -351,7 +350,6 @@ def adjusted(screened: ScreenedPhotos, correction: Polynomial | None, settings: 
             *notes.photo_notes(strip, resection),
         ),
         screened_control=screened.screened_control,
-        shared=screened.shared,
         photo_stages=PhotoStages(
             strip=strip,
             sigma=stage.sigma,

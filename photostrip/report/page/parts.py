@@ -39,10 +39,6 @@ class Words:
     names: tuple[tuple[str, str], ...] = ()  # what it speaks of, ``("point", "K01")``: a page links its rows
 
 
-def numbered(*texts: str) -> tuple[Words, ...]:
-    return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
-
-
 Part = Table | Facts | Words
 
 

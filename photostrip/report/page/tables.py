@@ -15,7 +15,6 @@ from photostrip.report.page.parts import Column, Table
 if TYPE_CHECKING:
     from photostrip.report.page.angles import AngleUnit
 
-Form = Callable[[float], str]
 Row = Any  # of a document: a mapping, or whatever the functions of the columns know to read
 Value = str | Callable[[Row], Any]  # key of a row, with dots where it lies deeper (``discrepancy.up``), or function
 
@@ -52,16 +51,6 @@ def tabulated(
     """Return a table of rows; the lines of the foot are given as they are printed."""
     cells = tuple(tuple(each.cell(row) for each in columns) for row in rows)
     return Table(columns=tuple(each.column for each in columns), rows=cells, foot=foot, note=note)
-
-
-def over_plane(
-    rows: Sequence[Row], axes: tuple[str, str], value: str, corner: Column, form: Form, heads: Form
-) -> Table:
-    """Arrange values as they lie in the plane of two axes: the first to the right, the second upwards."""
-    across, upwards = (sorted({row[axis] for row in rows}) for axis in axes)
-    at = {(row[axes[0]], row[axes[1]]): row[value] for row in rows}
-    lines = tuple((heads(y), *(form(at[x, y]) for x in across)) for y in reversed(upwards))
-    return Table((corner, *(Column(heads(x)) for x in across)), lines)
 
 
 def _reader(value: Value) -> Callable[[Row], Any]:

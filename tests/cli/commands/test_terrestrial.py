@@ -465,16 +465,12 @@ WHOLE = "camera={principal_distance: 100, format: [100, 80]}"
         (("directions", "camera=UMK", "at=[[1, 2]]"), "--set: camera.preset: there is no preset `UMK`; expected one of Photheo 19/1318, UMK 10/1318"),
         (("directions", D100), "--set: no points are given; expected `table` or `at`"),
         (("directions", D100, "table=far.csv", "at=[[1, 2]]"), "--set: points are given twice"),
-        (("directions", "camera={principal_distance: -5}", "at=[[1, 2]]"), "--set: camera.principal_distance: -5 is out of range; expected 1 to 100000 mm"),
         (("directions", D100, "at=[[1, 20000]]"), "--set: at[0][1]: 20000 is out of range; expected -10000 to 10000 mm"),
         (("directions", D100, "table=far.csv"), "far.csv:2:5: z: 2e+09 is out of range; expected -10000 to 10000 mm"),
         (("directions", D100, "table=far.csv", "unit=um"), "far.csv:2:5: z: 2e+09 is out of range; expected -1e+07 to 1e+07 um"),
         (("photo", D100, "at=[[1001, 2]]"), "--set: at[0][0]: 1001 is out of range; expected -1000 to 1000 deg"),
         (("orientation", D100, "table=sigma.csv"), "sigma.csv:2:11: sx: 50 is out of range; expected 1e-06 to 10 mm"),
         (("displacement", "survey.yaml", "measurements.sigma=50"), "--set: measurements.sigma: 50 mm is out of range; expected 1e-06 to 10 mm: is the unit right?"),
-        (("displacement", "survey.yaml", "cameras.long.principal_distance=0.19"), "--set: cameras.long.principal_distance: 0.19 is out of range; expected 1 to 100000 mm"),
-        (("directions", D100, "at=[[1]]"), "--set: at[0]: 1 value in the list; expected 2 values"),
-        (("directions", D100, "at=[[1, x]]"), "--set: at[0][1]: `x` is not a number; expected a number"),
         (("directions", D100, "at=[[1, 2]]", "omega=90"), "--set: omega: with 90 deg the camera looks straight up or down"),
         (("directions", D100, "table=missing.csv"), "--set: table: missing.csv does not exist"),
         (("directions", D100, "table=wrong.csv"), "wrong.csv:2:3: x: `a` is not a number; expected a number"),
@@ -486,12 +482,9 @@ WHOLE = "camera={principal_distance: 100, format: [100, 80]}"
         (("theodolite", WHOLE), "--set: nothing says how well directions are measured; expected `sigma_arcsec` or `theodolite`"),
         (("theodolite", WHOLE, "theodolite=T2"), "--set: theodolite: `T2` is not known; expected one of Theo 010, Theo 020, Theo 080"),
         (("theodolite", WHOLE, "theodolite=Theo 010", "sigma_arcsec=1"), "--set: sigma_arcsec: the theodolite and its standard deviation are both given"),
-        (("theodolite", WHOLE, "sigma_arcsec=0"), "--set: sigma_arcsec: 0 is out of range; expected 0.0001 to 36000 ″"),
-        (("theodolite", WHOLE, "sigma_arcsec=2", "rounds=0"), "--set: rounds: 0 is out of range"),
         (("accuracy", WHOLE, "step=0.1"), "--set: step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
         (("accuracy", WHOLE, "as_printed=true", "omega=3"), "--set: as_printed: the printed formulas hold for a level camera; leave out `omega` and `kappa`"),
         (("orientation", D100, "table=sights.csv", "free=[f]"), "--set: free[0]: `f` is not known; expected one of principal-distance, principal-point, refraction"),
-        (("orientation", D100, "table=sights.csv", "significance=1"), "--set: significance: 1 is out of range; expected 1e-06 to 0.5"),
         (("orientation", D100, "table=sights.csv"), "sights.csv:3:7: lambda: neither direction to point B is given; expected lambda, beta or both"),
         (("orientation", D100, "table=zenith.csv"), "zenith.csv:2:8: beta: 95 deg is not below the zenith; expected an elevation between -90 and 90 degrees, not a zenith distance"),
         (("displacement", "survey.yaml", "processing.signif=1"), "--set: processing.signif: the key `signif` is not known; did you mean `significance`?"),
@@ -569,16 +562,6 @@ def test_a_table_over_the_photo_has_a_largest_size(
     monkeypatch.setattr(keys, "MOST_POINTS", most)
     found, _, err = call(capsys, "accuracy", WHOLE, "step=20")
     assert (found, "gives more than 19 points" in err) == (code, code == 2)
-
-
-@pytest.mark.parametrize(
-    "kind", ["directions", "photo", "accuracy", "theodolite", "orientation", "displacement", "one-station", "cameras"]
-)
-def test_schemas_know_every_key(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", "--terrestrial", kind]) == 0
-    schema = json.loads(capsys.readouterr().out)
-    assert schema["title"] == f"photostrip terrestrial {kind}"
-    assert all("description" in each for each in nonempty(schema["properties"].values()))
 
 
 # ------------------------------------------------------------------------------------------------------ one station
