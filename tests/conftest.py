@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import multiprocessing
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
 
 limit_threads()  # before a test imports numpy
+multiprocessing.set_executable(sys.executable)  # before a test puts a copy of an interpreter in its place
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=20)
 settings.register_profile("quick", derandomize=True, deadline=None, max_examples=12)  # make check

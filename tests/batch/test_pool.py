@@ -18,9 +18,6 @@ from tests.batch import faulty
 from tests.batch.projects import write_projects
 from tests.loops import nonempty
 
-# copies of this process, of which other tests make some, end what looks after its semaphores
-pytestmark = pytest.mark.filterwarnings("ignore:resource_tracker")
-
 
 def tasks_of(folder: Path, names: list[str]) -> list[Task]:
     """Give tasks for copies of one small project under these names."""
