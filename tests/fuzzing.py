@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
+from photostrip.formats.output import result_files
+from photostrip.result.description import Columns, described
 from photostrip.simulation.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES
 from tests.results import spec, write_project
@@ -23,7 +25,8 @@ if TYPE_CHECKING:
 
 LONGEST = 10.0  # seconds of the processor that one case may take
 CODES = {0, 1, 2, 3}
-RESULT = 10  # at most so many files in a result
+BESIDE_TABLES = {"result.json", "project.resolved.yaml", "refined.csv", "report.html"}
+TABLES = {result_files.FILES.get(key, key) for key, each in described().items() if isinstance(each, Columns)}
 # What means something to YAML, a table, Python or a schema; characters that are hardly seen; numbers at limits.
 SIGNS = [" ", "\n", "\r\n", "\t", ": ", "- ", "&a ", "!a ", "<<: ", "---\n", "\u200b", "\x00", "\x85", "\ufeff"]
 WORDS = """, ; : # ' " [ ] { } *a \\ | > % @ ? [[[[ - ~ . ../ /dev/null /dev/zero =1+1 1:20 é 🛩️ １ ９９ 1_0 0123
@@ -355,10 +358,11 @@ def _files(case: Case, folder: Path, result: Path, code: int) -> list[str]:
     found = [f"{name} was changed" for name, data in case.files.items() if (folder / name).read_bytes() != data]
     strangers = {path.name for path in folder.iterdir()} - set(case.files) - {"result"}
     found += [f"{name} was left behind" for name in sorted(strangers)]
+    known = BESIDE_TABLES | {f"{name}.csv" for name in TABLES}
     written = sorted(path.name for path in result.iterdir()) if result.exists() else []
     if any(name.endswith(".tmp") for name in written) or (written and code not in {0, 1}):
         found.append(f"exit code {code} and half a result: {written}")
-    if written and (len(written) > RESULT or "result.json" not in written):
+    if written and ("result.json" not in written or not known.issuperset(written)):
         found.append(f"not the files of a result: {written}")
     if written:
         json.loads((result / "result.json").read_text(encoding="utf-8"))
