@@ -71,13 +71,15 @@ def test_the_published_orientations_and_their_standard_deviations(strasbourg: Re
         photo = photos[row["photo"]]
         assert [photo[axis] for axis in "xyz"] == pytest.approx([float(row[f"{a}_m"]) for a in "XYZ"], abs=0.001)
         expected = [float(row[f"{name}_deg"]) for name in ("omega", "phi", "kappa")]
-        assert photo["angles"]["values"] == pytest.approx(expected, abs=0.0001)
+        assert [photo[f"angle_{n}"] for n in (1, 2, 3)] == pytest.approx(expected, abs=0.0001)
     with (SAMPLES / "sxb-strasbourg" / "reference.csv").open(encoding="utf-8", newline="") as file:
         for row in nonempty(csv.DictReader(file)):  # published standard deviations, three digits
-            sigma = photos[row["photo"]]["sigma"]
-            assert [sigma[a] for a in "xyz"] == pytest.approx([float(row[f"sigma_{a}"]) for a in "xyz"], rel=0.01)
+            photo = photos[row["photo"]]
+            assert [photo[f"sigma_{a}"] for a in "xyz"] == pytest.approx(
+                [float(row[f"sigma_{a}"]) for a in "xyz"], rel=0.01
+            )
             angles = [float(row[f"sigma_{name}_deg"]) for name in ("omega", "phi", "kappa")]
-            assert sigma["angles"] == pytest.approx(angles, rel=0.01)
+            assert [photo[f"sigma_angle_{n}"] for n in (1, 2, 3)] == pytest.approx(angles, rel=0.01)
 
 
 def test_the_published_orientations_without_strips(tmp_path: Path) -> None:
