@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from photostrip.library.simulation import Simulation, simulate
     from photostrip.library.table import Table
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # The module in which each public name stands. A change here is a change for every script of a user.
 _HOMES = {

@@ -19,9 +19,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ],
     baseline: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="[BASELINE]", help="A baseline, a result.json or a truth.json, or a folder of baselines."
-        ),
+        typer.Argument(metavar="BASELINE", help="A baseline, a result.json or a truth.json, or a folder of baselines."),
     ] = None,
     tolerances: Annotated[
         Path | None, typer.Option("--tol", metavar="FILE", help="Tolerance profile (YAML); default: last digits only.")

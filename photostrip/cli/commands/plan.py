@@ -15,11 +15,11 @@ from photostrip.planning import PlanKind
 
 def plan(
     *,
-    kind: Annotated[PlanKind, typer.Argument(help="What is planned.", show_default=False)],
+    kind: Annotated[PlanKind, typer.Argument(metavar="KIND", help="What is planned.", show_default=False)],
     file: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[FILE]", help="Plan (YAML); without one the keys that are set say all.", show_default=False
+            metavar="FILE", help="Plan (YAML); without one the keys that are set say all.", show_default=False
         ),
     ] = None,
     assignments: Assigned = None,

@@ -15,12 +15,10 @@ from photostrip.terrestrial import TerrestrialKind
 
 def terrestrial(
     *,
-    kind: Annotated[TerrestrialKind, typer.Argument(help="What is computed.", show_default=False)],
+    kind: Annotated[TerrestrialKind, typer.Argument(metavar="KIND", help="What is computed.", show_default=False)],
     file: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="[FILE]", help="Keys (YAML); without one those that are set say all.", show_default=False
-        ),
+        typer.Argument(metavar="FILE", help="Keys (YAML); without one those that are set say all.", show_default=False),
     ] = None,
     assignments: Assigned = None,
     form: Printed = "text",
