@@ -12,24 +12,10 @@ from photostrip.cli.options import Silent
 from photostrip.cli.sheets import Assigned, Printed, Written, check_target, deliver
 from photostrip.strip import StepName
 
-COLUMNS = """\b
-Columns of FILE:
-  interior      mark, x, y, x_photo, y_photo
-  refine        point, x, y
-  relative      point, x_left, y_left, x_right, y_right
-  intersection  the same
-  chain         photo, omega, phi, kappa (degrees)
-  scale         point, x, y, z, x_next, y_next, z_next
-  strip         photo, point, x, y
-  absolute      point, x, y, z, x_ground, y_ground, z_ground
-  polynomial    point, x, y, z, misclosure
-  resection     point, x, y, x_ground, y_ground, z_ground
-  bundle        photo, point, x, y"""
-
 
 def step(
     *,
-    name: Annotated[StepName, typer.Argument(help="Which step.", show_default=False)],
+    name: Annotated[StepName, typer.Argument(metavar="NAME", help="Which step.", show_default=False)],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Table of points (CSV).", show_default=False)],
     assignments: Assigned = None,
     trace: Annotated[
@@ -42,12 +28,23 @@ def step(
     """Take one step of the method alone, from a table of points; image coordinates in mm.
 
     `photostrip schema --step NAME` lists its keys: principal_distance, base, unit, sigma_um and others.
-    """
+
+    \b
+    Columns of FILE:
+      interior      mark, x, y, x_photo, y_photo
+      refine        point, x, y
+      relative      point, x_left, y_left, x_right, y_right
+      intersection  the same
+      chain         photo, omega, phi, kappa (degrees)
+      scale         point, x, y, z, x_next, y_next, z_next
+      strip         photo, point, x, y
+      absolute      point, x, y, z, x_ground, y_ground, z_ground
+      polynomial    point, x, y, z, misclosure
+      resection     point, x, y, x_ground, y_ground, z_ground
+      bundle        photo, point, x, y
+    """  # noqa: D301 (the sign by which a paragraph keeps its lines)
     with failures_as(form):
         check_target(output)
         from photostrip.library.step import step as computed
 
         deliver(computed(name, str(file), assignments or [], trace=trace), form, output, quiet=quiet)
-
-
-step.__doc__ = f"{step.__doc__}\n    {COLUMNS}\n"
