@@ -151,7 +151,7 @@ def geocentric(document: Document, places: Floats) -> Floats:
     crs = document["frame"]["crs"]
     if crs == "local":
         return places
-    return places if crs == "geocentric" else np.column_stack(to_geocentric(crs).transform(*places.T))
+    return places if crs == "geocentric" else np.column_stack(to_geocentric(crs).transform(*places.T.tolist()))
 
 
 @cache
