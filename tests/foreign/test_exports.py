@@ -87,7 +87,7 @@ def geocentric(crs: str, enu: Floats) -> Floats:
     """Give Cartesian coordinates of points of a map."""
     plane = CRS(crs).to_3d()
     across = Transformer.from_crs(plane, CRS("EPSG:4978"), always_xy=True)
-    return np.stack(across.transform(*enu.T), axis=-1)
+    return np.stack(across.transform(*enu.T.tolist()), axis=-1)
 
 
 def grid_axes(crs: str, enu: Floats) -> Floats:
