@@ -118,11 +118,3 @@ def block_at(path: str) -> Block:
     for key in path.split("."):
         place = place[key]
     return place
-
-
-def quantity_at(path: str) -> Quantity | None:
-    """Find a key by the keys that lead to it; what stands below a key that is described as a whole belongs to it."""
-    place: object = described()
-    for key in path.split("."):
-        place = place.get(key) if isinstance(place, Block) else place
-    return place if isinstance(place, Quantity) else None

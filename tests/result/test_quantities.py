@@ -12,7 +12,7 @@ import pytest
 
 from photostrip.formats.output.result_json import checked, read_baseline, to_json
 from photostrip.pipeline.inputs import Settings
-from photostrip.result.description import LEFT_OUT, Quantity, described, quantity_at
+from photostrip.result.description import LEFT_OUT, Block, Quantity, described
 from photostrip.result.quantities import rounded_as
 from photostrip.result.table import Table, plain_of
 from photostrip.simulation import Models, simulate
@@ -24,8 +24,6 @@ from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from photostrip.result.description import Block
 
     Document = dict[str, Any]
 
@@ -43,6 +41,14 @@ def leaves(value: object, path: str = "") -> Iterator[tuple[str, object, str]]:
             yield from leaves(each, f"{path}.{key}" if path else key)
     else:
         yield path, value, ""
+
+
+def quantity_at(path: str) -> Quantity | None:
+    """Find a key by the keys that lead to it; what stands below a key that is described as a whole belongs to it."""
+    place: object = described()
+    for key in path.split("."):
+        place = place.get(key) if isinstance(place, Block) else place
+    return place if isinstance(place, Quantity) else None
 
 
 def faults(document: Document) -> set[str]:

@@ -166,11 +166,16 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if any(each.code in OF_LISTS for each in causes):  # all of the block says it best
         findings = [each for each in findings if each.code not in OF_LISTS]
     if not any(each.is_error or each.code == ALIKE for each in findings):  # a camera explains much of misread control
-        explained = {each.key for each in causes if each.key}
-        findings = [each for each in findings if each.key not in explained] + causes
+        keys = [each.key for each in causes if each.key]
+        findings = [each for each in findings if not _is_explained(each.key, keys)] + causes
     if not any(each.is_error for each in findings):
         findings += shared_errors.find_shifted_checks(result)
     return _told(findings, inputs, settings)
+
+
+def _is_explained(key: str, keys: Sequence[str]) -> bool:
+    """Whether causes that were found speak of a key, or of a part of it: an offset, of the heights of positions."""
+    return bool(key) and any(each == key or each.startswith(f"{key}.") for each in keys)
 
 
 def _causes(bundle: Bundle, inputs: Inputs) -> list[Finding]:

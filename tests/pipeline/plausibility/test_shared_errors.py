@@ -71,7 +71,9 @@ def lost(result: Result) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("strips", "shift"), [(1, (10.0, 0.0, 0.0)), (2, (7.0, -7.0, 0.0)), (1, (0.0, 0.0, 10.0))])
+@pytest.mark.parametrize(
+    ("strips", "shift"), [(1, (10.0, 0.0, 0.0)), (2, (7.0, -7.0, 0.0)), (1, (0.0, 0.0, 10.0)), (1, (0.0, 0.0, -600.0))]
+)
 def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shift: tuple[float, float, float]) -> None:
     """Tested one by one, 12 control coordinates and 23 positions went, and points were 7 to 10 m off."""
     simulation, result = adjusted(strips=strips, shift=shift)
