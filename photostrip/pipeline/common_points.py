@@ -15,7 +15,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.pipeline import precision
+from photostrip.pipeline.precision import MOST_PHOTOS, joined_precision, precision_of_photos, too_long
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.pipeline.strips.absolute import ScreenedPhotos
@@ -41,15 +41,15 @@ def join_photos(
     of_checks: whether the precision of check points alone is wanted.
     """
     joined = join_strips(strips, observations, output)
-    too_long = [strip for strip in strips if precision.too_long(strip) and not of_checks]
-    if too_long or not settings.precision:
-        notes = (precision_of_long_strip(strip.of_photos.strip, precision.MOST_PHOTOS) for strip in too_long)
+    long_strips = [strip for strip in strips if too_long(strip) and not of_checks]
+    if long_strips or not settings.precision:
+        notes = (precision_of_long_strip(strip.of_photos.strip, MOST_PHOTOS) for strip in long_strips)
         return replace(joined, notes=(*notes, *joined.notes)) if settings.precision else joined
     each = [
-        precision.of_photos(strip, before.photos, observations, given, of_checks=of_checks)
+        precision_of_photos(strip, before.photos, observations, given, of_checks=of_checks)
         for strip, before in zip(strips, screened, strict=True)
     ]
-    return replace(joined, precision=precision.joined(each, strips, joined.points))
+    return replace(joined, precision=joined_precision(each, strips, joined.points))
 
 
 def join_strips(strips: tuple[StripResult, ...], observations: PhotoPoints, output: GroundFrame) -> AdjustedStrips:

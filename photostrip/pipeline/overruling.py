@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 
 
-def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
+def require_measured(settings: RelativeSettings, observations: PhotoPoints) -> None:
     """Refuse entries of `keep` and `drop` that name no measurement, and those in both, with a fault for each."""
     found = rows_of((*settings.keep, *settings.drop), observations)
     known = {entry for entry, row in found.items() if row >= 0}
@@ -99,7 +99,7 @@ def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]
     return wanted
 
 
-def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
+def kept_rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
     """Rows of the measurements of a list, ascending."""
     return np.array(sorted(rows_of(entries, observations).values()), np.intp)
 
@@ -124,7 +124,7 @@ def restored(screened: ScreenedPairs, weight: Floats, kept: Flags) -> ScreenedPa
     return replace(screened, orientation=oriented, rejections=log)
 
 
-def notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> Iterator[Note]:
+def overruling_notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> Iterator[Note]:
     """Say what the user has decided, one note for each list that touches the strip."""
     kept, dropped = (
         ", ".join(entry for entry in entries if any(entry.startswith(f"{photo}/") for photo in photos))

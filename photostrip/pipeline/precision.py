@@ -129,7 +129,7 @@ class StripPrecision:
     check: CheckErrors | None  # errors at the strip's check points, with their covariance
 
 
-def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
+def joined_precision(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
     """Precision of all strips together."""
     return Precision(
         points=_means(strips, results, points.number),
@@ -174,7 +174,7 @@ def _keys(strip: StripPrecision) -> Numbers:
 MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the square of their number, to 1 s
 
 
-def of_photos(
+def precision_of_photos(
     strip: StripResult,
     on_control: OrientedPhotos,
     observations: PhotoPoints,

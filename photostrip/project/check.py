@@ -24,7 +24,7 @@ from photostrip.formats.text.tables import Table
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted, listed
-from photostrip.pipeline import overruling
+from photostrip.pipeline.overruling import require_measured, require_named
 from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, Strip, require_whole
 from photostrip.pipeline.plausibility import gate
@@ -72,9 +72,9 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     except InputError as error:
         return Checked(path=str(path), faults=error.faults, findings=error.findings, notes=(), document={})
     inputs, models = project.inputs, project.inputs.models
-    faults = _refused(project, partial(overruling.require, project.settings.relative, inputs.observations))
+    faults = _refused(project, partial(require_measured, project.settings.relative, inputs.observations))
     if models is not None:
-        faults += _refused(project, partial(overruling.require_named, project.settings.links, models.points))
+        faults += _refused(project, partial(require_named, project.settings.links, models.points))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
     used = observations_used(inputs) if models is None else np.zeros(0, np.intp)

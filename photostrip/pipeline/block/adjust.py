@@ -16,7 +16,7 @@ from photostrip.network.cofactors import Correlation, correlations
 from photostrip.network.cofactors import cofactors_of as precision_of
 from photostrip.network.hypotheses import taken_up
 from photostrip.network.snooping import ScreenedBundle
-from photostrip.pipeline.block import block_result
+from photostrip.pipeline.block import block_result, models_result
 from photostrip.pipeline.block import models as block_models
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
@@ -80,7 +80,7 @@ def adjust_block(
     bundle = _bundle(inputs, settings, start, estimated)
     _refuse_inseparable(bundle.correlations, set(estimated.asked))
     if inputs.models is not None:
-        adjusted = block_models.adjusted_strips(inputs.models, observations, ground.output, bundle)
+        adjusted = models_result.adjusted_strips(inputs.models, observations, ground.output, bundle)
     else:
         adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
     if adjusted.precision is None or not settings.precision:

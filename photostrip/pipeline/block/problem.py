@@ -24,7 +24,7 @@ from photostrip.network.problem import (
     StartValues,
 )
 from photostrip.network.reliability import sigmas
-from photostrip.pipeline import overruling
+from photostrip.pipeline.overruling import rows_of
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
 from photostrip.pipeline.results import BlockProblem, BlockStart
@@ -89,7 +89,7 @@ def build(
 def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
     """Mark the measurements that a list of the user names."""
     flags = np.zeros(len(observations), bool)
-    flags[[row for row in overruling.rows_of(entries, observations).values() if row >= 0]] = True
+    flags[[row for row in rows_of(entries, observations).values() if row >= 0]] = True
     return flags
 
 

@@ -21,7 +21,7 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.pipeline import overruling
+from photostrip.pipeline.overruling import overruling_notes
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.results import PhotoStages, StripResult
@@ -337,7 +337,7 @@ def adjusted(screened: ScreenedPhotos, correction: Polynomial | None, settings: 
         rays=np.bincount(points, minlength=len(formed.point)),
         depth=float(depths(xyz, points, resection.centers, resection.rotations, photo).mean()),
         notes=(
-            *overruling.notes(settings.relative, strip.id, strip.photos),
+            *overruling_notes(settings.relative, strip.id, strip.photos),
             *notes.screening_notes(strip, stage.screened, stage.sigma),
             *([] if stage.rays_tested else [notes.rays_not_tested(strip)]),
             *notes.wrong_control_notes(strip, screened.screened_control),

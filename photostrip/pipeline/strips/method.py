@@ -11,7 +11,7 @@ from itertools import chain
 
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.pipeline import overruling
+from photostrip.pipeline.overruling import require_measured, require_named, require_weighted
 from photostrip.pipeline.inputs import SIMILARITY, Inputs, Settings, Strip
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips import absolute, models
@@ -29,14 +29,14 @@ def form_strips(
     models = inputs.models
     if models is None:
         return form_photos(inputs, observations, settings)
-    overruling.require_named(settings.links, models.points)
+    require_named(settings.links, models.points)
     return [link_strip(strip, models.points, settings) for strip in models.strips]
 
 
 def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[FormedPhotos]:
     """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
-    overruling.require(settings.relative, observations)
-    overruling.require_weighted(settings.formation, observations)
+    require_measured(settings.relative, observations)
+    require_weighted(settings.formation, observations)
     whole = [strip for strip in inputs.strips if len(strip.photos) > 1]
     if len(whole) < len(inputs.strips) and not settings.together:
         alone = next(strip.photos for strip in inputs.strips if len(strip.photos) == 1)

@@ -16,7 +16,7 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.strip_rays import StripRays
-from photostrip.pipeline import overruling
+from photostrip.pipeline.overruling import kept_rows, restored, touched
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages
 from photostrip.points import PhotoPoints
@@ -207,11 +207,11 @@ def screened_pairs(
 ) -> tuple[pair_screening.ScreenedPairs, Floats]:
     """Orient pairs, those among them that cannot be used, without what is wrong in them; and their weights before."""
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-    pairs = pairs.without(overruling.touched(settings.drop, observations, pairs.rows))
+    pairs = pairs.without(touched(settings.drop, observations, pairs.rows))
     first, converged = orient_unchecked(pairs)
     screened = pair_screening.screen_pairs(first, settings, strip.median_sigma(observations), converged)
-    kept = overruling.touched(settings.keep, observations, pairs.rows)
-    return overruling.restored(screened, pairs.weight, kept), pairs.weight
+    kept = touched(settings.keep, observations, pairs.rows)
+    return restored(screened, pairs.weight, kept), pairs.weight
 
 
 def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedPhotos:
@@ -236,7 +236,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             sigma=scatter,
             weight=weight,
             stated=sigma,
-            kept=overruling.rows(settings.relative.keep, observations),
+            kept=kept_rows(settings.relative.keep, observations),
         )
         readmit = settings.relative.screening in pair_screening.SEARCHES
         oriented, formed, wrong, tested = form_screened(
