@@ -22,10 +22,8 @@ from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.library.step_arguments import rows, same, sigma0_of
 from photostrip.library.steps_of_strips import Absolute, Bundle, Strip, absolute, bundle, polynomial, strip
 from photostrip.strip.corrections import Bending, refraction_constant, undistort
-from photostrip.strip.formed_strip import hand_on_rotations
-from photostrip.strip.intersection import Intersection, intersect
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
+from photostrip.strip.formed_strip import Intersection, hand_on_rotations, intersect
+from photostrip.strip.relative_orientation import MINIMUM_POINTS, Pairs, orient_pairs
 from photostrip.strip.resection import OrientedPhoto, space_resection
 
 __all__ = [

@@ -18,11 +18,9 @@ from photostrip.network.adjustment import IterationStep, solve
 from photostrip.network.cofactors import cofactors_of
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.points import PhotoPoints
-from photostrip.strip.formed_strip import FirstPhoto, form_from_pairs
-from photostrip.strip.polynomial_terms import POWERS, columns
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.scale_transfer import StripFormationSettings
+from photostrip.strip.formed_strip import FirstPhoto, StripFormationSettings, form_from_pairs
+from photostrip.strip.polynomial import POWERS, term_columns
+from photostrip.strip.relative_orientation import collect_pairs, orient_pairs
 
 Names = tuple[Sequence[str], Sequence[str]]
 
@@ -125,7 +123,7 @@ def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> 
     """
     if unknown := [each for each in terms if each not in POWERS] or ([] if terms else [""]):
         raise InputError(f"there is no term {unknown[0]!r}: {', '.join(POWERS)}")
-    design = columns(rows(xyz, 3), list(terms))
+    design = term_columns(rows(xyz, 3), list(terms))
     size = np.linalg.norm(design, axis=0)
     values = rows(np.reshape(misclosures, (-1, 1)), 1)[:, 0]
     same(design, values)

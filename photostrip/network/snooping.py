@@ -46,8 +46,8 @@ from photostrip.network.testing import (
     decide_rays,
 )
 from photostrip.rejection import Rejection
-from photostrip.strip.control_search import LARGEST_SHARE
-from photostrip.strip.pair_search import AMPLE, OUT_TO_ONE_MORE
+from photostrip.strip.control_screening import LARGEST_SHARE
+from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on

@@ -14,10 +14,8 @@ from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
 from photostrip.strip.formed_strip import FormedStrip, mean_points
-from photostrip.strip.pair_search import ALPHA, FIFTH_WRONG
-from photostrip.strip.relative_orientation.orientation import Orientation
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.strip.relative_orientation.standard_points import MINIMUM_LEFT
+from photostrip.strip.pair_screening import ALPHA, FIFTH_WRONG
+from photostrip.strip.relative_orientation import MINIMUM_LEFT, MINIMUM_POINTS, Orientation
 from photostrip.strip.robust import MEDIAN_SPREAD, scales
 
 

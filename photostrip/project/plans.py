@@ -49,7 +49,7 @@ from photostrip.project.sections import (
 from photostrip.project.simulation import SimulatedCamera, camera_of
 from photostrip.project.yaml.reading import Reading, read_keys, valid_section
 from photostrip.simulation import Points
-from photostrip.strip.relative_orientation.orientation import SCREENINGS
+from photostrip.strip.relative_orientation import SCREENINGS
 from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 

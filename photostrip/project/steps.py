@@ -17,7 +17,7 @@ from photostrip.project.sections import (
     key,
     one_of,
 )
-from photostrip.strip.polynomial_terms import POWERS
+from photostrip.strip.polynomial import POWERS
 
 
 class StepKeys(Section):

@@ -21,8 +21,8 @@ from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, written
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, intersect_models
-from photostrip.strip.polynomial_terms import POWERS
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.polynomial import POWERS
+from photostrip.strip.relative_orientation import ELEMENTS
 
 PAIRED = 15  # control points whose 105 distances can still be read
 PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")

@@ -13,12 +13,9 @@ from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.numbers import order_of
 from photostrip.result.table import Table
 from photostrip.strip.formed_strip import base_angles
-from photostrip.strip.pair_screening import SEARCHES, tested
+from photostrip.strip.pair_screening import SEARCHES, GlobalTest, residual_sigma, tested
 from photostrip.strip.pair_screening import stages as tests_of
-from photostrip.strip.pair_search import GlobalTest, residual_sigma
-from photostrip.strip.relative_orientation.orientation import Orientation, RelativeSettings
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.relative_orientation import ELEMENTS, MINIMUM_POINTS, Orientation, RelativeSettings
 
 
 @dataclass(frozen=True, eq=False)
