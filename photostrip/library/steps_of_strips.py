@@ -15,8 +15,8 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.library.step_arguments import Rays, of_rays, rows, same, sigma0_of
 from photostrip.network.adjustment import IterationStep, solve
-from photostrip.network.cofactors import cofactors_of
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
+from photostrip.network.reliability import cofactors_of
 from photostrip.points import PhotoPoints
 from photostrip.strip.formed_strip import FirstPhoto, StripFormationSettings, form_from_pairs
 from photostrip.strip.polynomial import POWERS, term_columns

@@ -20,7 +20,6 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.network import adjustment, defects, hypotheses, reliability
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
-from photostrip.network.cofactors import JointCofactors, cofactors_of
 from photostrip.network.defects import is_free
 from photostrip.network.hypotheses import (
     DRIFT,
@@ -34,7 +33,7 @@ from photostrip.network.hypotheses import (
     Likely,
 )
 from photostrip.network.problem import BundleProblem, BundleSettings, PositionObservations
-from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
+from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, JointCofactors, Limit, cofactors_of
 from photostrip.network.testing import (
     ROBUST,
     START,

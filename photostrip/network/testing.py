@@ -26,10 +26,9 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.adjustment import BundleSolution, Selection
-from photostrip.network.cofactors import JointCofactors
 from photostrip.network.observations import in_models
 from photostrip.network.problem import BundleProblem, ModelObservations
-from photostrip.network.reliability import IMAGE, Limit, image_shift
+from photostrip.network.reliability import IMAGE, JointCofactors, Limit, image_shift
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY, Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.strip.pair_screening import LARGEST_SET, LIKELIER, subsets

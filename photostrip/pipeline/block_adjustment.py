@@ -18,10 +18,10 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import defects, hypotheses, reliability, snooping
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
-from photostrip.network.cofactors import Correlation, coordinates_of, correlations, joint_cofactors
-from photostrip.network.cofactors import cofactors_of as precision_of
 from photostrip.network.hypotheses import taken_up
 from photostrip.network.problem import CALIBRATION, BundleProblem
+from photostrip.network.reliability import Correlation, coordinates_of, correlations, joint_cofactors
+from photostrip.network.reliability import cofactors_of as precision_of
 from photostrip.network.snooping import ScreenedBundle
 from photostrip.notes import Note
 from photostrip.pipeline import block_problem, block_start

@@ -3,7 +3,7 @@
 Each is a row of ``READINGS``. Where a formed strip does not fit its control, it is laid on it under each of them, and
 what is written has a likelihood: that of the misclosures by their joint covariance, with a price for what is taken out.
 The likeliest is named, if the strip fits under it and chance does not make as much of so many. Where none fits,
-something may be common to all heights or to one list (``shared_by_control``).
+something may be common to all heights or to one list (``find_shared``).
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ A formed strip on its control, however that is read: what it predicts of each co
 
 The errors of a strip by those of its image coordinates are known, all of them together, so that a strip which bends as
 they let it contradicts nothing. Under each reading the strip is laid on its control by a similarity, and what no other
-control predicts is taken out, as a run with polynomials does (``control_search``). Points far away from all others
+control predicts is taken out, as a run with polynomials does (``control_screening``). Points far away from all others
 are predicted and take no part.
 """
 
@@ -31,7 +31,7 @@ from photostrip.camera import Camera
 from photostrip.errors import GeometryError, InputError, PhotostripError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
-from photostrip.network.cofactors import coordinates_of, joint_cofactors
+from photostrip.network.reliability import coordinates_of, joint_cofactors
 from photostrip.notes import Finding
 from photostrip.pipeline import photos_on_control, strip_method
 from photostrip.pipeline.formed_photos import FormedPhotos, form_strip

@@ -24,7 +24,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.network.cofactors import coordinates_of, joint_cofactors
+from photostrip.network.reliability import coordinates_of, joint_cofactors
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.photos_on_control import OrientedPhotos, ScreenedPhotos, precision_of_long_strip

@@ -15,8 +15,8 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.network import reliability
 from photostrip.network.adjustment import Selection
-from photostrip.network.cofactors import Correlation
 from photostrip.network.problem import BundleProblem
+from photostrip.network.reliability import Correlation
 from photostrip.network.snooping import ScreenedBundle
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip

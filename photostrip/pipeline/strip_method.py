@@ -20,8 +20,8 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.adjustment import BundleSolution, solve
-from photostrip.network.cofactors import joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
+from photostrip.network.reliability import joint_cofactors
 from photostrip.pipeline import photos_on_control
 from photostrip.pipeline.formed_photos import FormedPhotos, form_strip
 from photostrip.pipeline.inputs import (
@@ -121,7 +121,7 @@ def models_on_control(
 ) -> ScreenedModels:
     """Lay a strip on that of its control which nothing contradicts.
 
-    Raises as ``orient_on_control`` does.
+    Raises as ``orient_models_on_control`` does.
     """
     models = orient_models_on_control(linked, control, frames, settings.absolute)
     if settings.links.screening == "none":

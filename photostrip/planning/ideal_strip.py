@@ -23,7 +23,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity
 from photostrip.network import problem as bundle
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of as bundle_precision
+from photostrip.network.reliability import cofactors_of as bundle_precision
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate

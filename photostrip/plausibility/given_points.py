@@ -12,7 +12,7 @@ Errors that all control shares, or that of one list, tested before points are te
 A principal distance that is wrong by a share e stretches a strip of nearly vertical photos in height by e against its
 plan; a control list in another frame, or with heights of another kind, lies beside the others by one shift. At the
 control these are few columns more in the misclosures: the heights above their mean, or ones at the coordinates of a
-list. They are tested by what the sum of squares loses with them (``control_search``), against what it loses without
+list. They are tested by what the sum of squares loses with them (``control_screening``), against what it loses without
 any one point.
 
 Source: derived.

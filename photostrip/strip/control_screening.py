@@ -4,7 +4,7 @@ Minimum deletion at the control: what the sum of squares loses without coordinat
 
 All misclosures w have the covariance D; a similarity, derivatives A, takes its part out. With
 M = D^-1 - D^-1 A (A^T D^-1 A)^-1 A^T D^-1 the sum of squares is w^T M w, and without coordinates K it is smaller
-by (M w)_K^T (M_KK)^-1 (M w)_K, the principle of ``pair_search``. The same holds for other errors, columns h with
+by (M w)_K^T (M_KK)^-1 (M w)_K, the principle of ``pair_screening``. The same holds for other errors, columns h with
 h^T M h and h^T M w: bends of the strip beyond its covariance, and wrong images of a control point.
 
 One multivariate test for each point, plan, height and all, by F in units of the scatter of the others, which is never
@@ -17,7 +17,7 @@ What was rejected of the control, how large its errors are, and what seems to ha
 Wrong control: coordinates that the strip and all other control contradict.
 
 The most significant hypothesis (a point in plan, in height, in both) is deleted and the rest tested again, until
-nothing is significant (``control_search``). Where the covariance does not explain what is left, the smallest set is
+nothing is significant. Where the covariance does not explain what is left, the smallest set is
 looked for without which it does: wrong coordinates, and bends of the strip beyond it (``candidates``). Where
 there is none, what the tests of single points found is all.
 

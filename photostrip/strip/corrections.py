@@ -16,7 +16,7 @@ Refinement: from photo coordinates to ideal image coordinates, as a pinhole in v
 The order of the corrections, from the image to the ideal, is that in which light collects the errors, backwards:
 
 1. principal point: coordinates are reduced to it;
-2. lens distortion, ``lens_distortion``;
+2. lens distortion;
 3. atmospheric refraction;
 4. Earth curvature, only where the ground frame does not carry it and it is asked for in image space.
 

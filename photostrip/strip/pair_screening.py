@@ -20,7 +20,7 @@ residuals. Every round takes at most one point from a pair, the worst, and orien
 at once also throws out good points that a bad neighbour has pulled. All pairs go through a round together. No
 rejection of theirs leaves a pair or a standard zone without support.
 
-``deletion``, ``robust`` and ``auto`` are in ``pair_search``.
+``deletion``, ``robust`` and ``auto`` are the searches above.
 
 Source: [004a]; the two-sided form and the order of work are chosen here, see docs/sources.md.
 """
