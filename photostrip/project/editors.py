@@ -24,9 +24,9 @@ KINDS = {  # where the keys of each kind of file stand, and its title
     "camera": ("plans", "CameraPlanFile", "photostrip plan camera"),
     "displacement": ("plans", "DisplacementPlanFile", "photostrip plan displacement"),
     "screening": ("plans", "ScreeningPlanFile", "photostrip plan screening"),
-    "terrestrial displacement": ("survey", "TerrestrialFile", "photostrip terrestrial displacement"),
+    "terrestrial displacement": ("terrestrial", "TerrestrialFile", "photostrip terrestrial displacement"),
     **{
-        f"terrestrial {kind}": ("directions", name, f"photostrip terrestrial {kind}")
+        f"terrestrial {kind}": ("terrestrial", name, f"photostrip terrestrial {kind}")
         for kind, name in {
             "directions": "DirectionsFile",
             "photo": "PhotoFile",
@@ -38,7 +38,7 @@ KINDS = {  # where the keys of each kind of file stand, and its title
         }.items()
     },
     **{
-        f"step {name}": ("steps", f"{kind}Keys", f"photostrip step {name}")
+        f"step {name}": ("plans", f"{kind}Keys", f"photostrip step {name}")
         for name, kind in {
             "interior": "Interior",
             "refine": "Refine",

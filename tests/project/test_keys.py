@@ -12,9 +12,8 @@ from photostrip.formats.text.findings import Findings
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, schema_of
 from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances
+from photostrip.project.reading import Node, Place, checked, homes, parse
 from photostrip.project.sections import Section
-from photostrip.project.yaml.reading import checked, homes
-from photostrip.project.yaml.tree import Node, Place, parse
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
