@@ -12,8 +12,7 @@ from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import Source, reading_from
 from photostrip.formats.text.table_text import LARGEST_TABLE
 from photostrip.geodesy.crs import grid_names
-from photostrip.project.yaml.reading import override, path_of, read_tree
-from photostrip.project.yaml.tree import Node
+from photostrip.project.reading import Node, override, path_of, read_tree
 
 
 @dataclass(frozen=True)
