@@ -78,7 +78,9 @@ def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple
         message = f"a step of {given.step:g} mm gives more than {MOST_POINTS} points"
         reading.refuse(("step",), message, "range", expected="a larger step")
         reading.findings.stop()
-    return camera, grid((width, height), given.step, level=given.both_level if isinstance(given, AccuracyFile) else given.level)
+    return camera, grid(
+        (width, height), given.step, level=given.both_level if isinstance(given, AccuracyFile) else given.level
+    )
 
 
 def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:

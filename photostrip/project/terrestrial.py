@@ -508,7 +508,7 @@ class Turned(Section):
         return self.omega == 0 and self.kappa == 0
 
     def attitude_in(self, angles: str, at: str = "") -> Attitude:
-        """Return the attitude; `angles`: their unit. Raises a fault, of the keys under `at`, where it has no azimuth."""
+        """Return the attitude; `angles`: their unit. Raises a fault, of a key under `at`, where it has no azimuth."""
         unit = RADIANS[angles]
         if abs(np.cos(self.omega * unit)) < GIMBAL:
             message = f"with {self.omega:g} {angles} the camera looks straight up or down, and has no azimuth"

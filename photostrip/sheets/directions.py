@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from math import sqrt
 from typing import Any
 
@@ -15,7 +16,13 @@ from photostrip.report.page.parts import DASH, Part, Words
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, by_columns, fields, plain, written
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.accuracy import Theodolite
-from photostrip.terrestrial.normal_case import Attitude, Phototheodolite, directions_from_photo, photo_from_directions
+from photostrip.terrestrial.normal_case import (
+    Attitude,
+    Phototheodolite,
+    directions_from_photo,
+    partials,
+    photo_from_directions,
+)
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
 from photostrip.units import ARCSECONDS, MICROMETRES
 
@@ -75,7 +82,21 @@ def directions_sheet(
         errors = np.column_stack([found.angle, found.vertical]) * ARCSECONDS
         more = tuple(Field(f"sigma_{name}_arcsec", "arcsec 2", f"m_{name}") for name in ("lambda", "beta"))
     points = _points(attitude, ids, xz, directions, more, errors)
-    return Sheet("directions", "Directions of image points", facts, [points])
+    by = partials(reduced, camera.principal_distance, attitude.rotation)
+    rates = np.concatenate([by.by_xz, by.by_f[..., None]], axis=-1).reshape(len(xz), -1) * ARCSECONDS / MICROMETRES
+    slopes = Rows(
+        "derivatives",
+        "Derivatives, seconds of arc for each µm, eq. 4",
+        (
+            Field("point"),
+            *(
+                Field(f"{direction}_by_{name}_arcsec_um", "ratio +4", f"{direction} / {name}")
+                for direction, name in product(("lambda", "beta"), ("x", "z", "f"))
+            ),
+        ),
+        by_columns(ids, rates),
+    )
+    return Sheet("directions", "Directions of image points", facts, [points, slopes], main="points")
 
 
 def photo_sheet(camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], directions: Floats) -> Sheet:

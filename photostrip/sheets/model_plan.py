@@ -314,8 +314,8 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
     alpha1, _, alpha2, _, _ = base_frame_elements(spec.element_errors, spec.base).tolist()
     constant, tilt = -(spec.focal**2) / spec.base * (alpha2 - alpha1) * unit, -alpha1 * spec.base * unit
     frames = (
-        f"dx2 at the control counts heights from the left photo as it lies, dZ from the base, and leaves out the constant"
-        f" f (dα2′ - dα1′) of eq. 10.9: dx2 is dZ {constant:+.3f} m, and {tilt:+.3f} m more over a base by the tilt dα1′."
+        "dx2 at the control counts heights from the left photo as it lies, dZ from the base and without the constant"
+        f" f (dα2′ - dα1′) of eq. 10.9: dx2 is {constant:+.3f} m more, and {tilt:+.3f} m over a base by the tilt dα1′."
         " The absolute orientation takes both back."
     )
     units = ("m", "m/mm", "m/mm", "m/mm²", "m/mm²")

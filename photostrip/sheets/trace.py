@@ -337,7 +337,9 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     yield Rows("", "", (Field("photo"), *places), matrices, note=note)
     turns = base_frames(formed.rotations[:-1], strip.of_photos.orientation.elements).reshape(-1, 9)
     frames = [(strip.strip.id, *names, *turn) for names, turn in zip(pairwise(photos), turns.tolist(), strict=True)]
-    note = "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; its first column is the base."
+    note = (
+        "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; its first column is the base."
+    )
     yield Rows("base_frames", "", (*hidden("strip"), Field("left"), Field("right"), *places), frames, note=note)
 
 
