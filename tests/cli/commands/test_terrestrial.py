@@ -135,6 +135,24 @@ def test_a_tilted_camera_has_a_table_of_the_whole_photo(capsys: pytest.CaptureFi
     assert value[0, 60]["vertical_arcsec"] == value[0, -60]["vertical_arcsec"]
 
 
+def test_rounds_of_every_theodolite_for_the_stricter_end_of_the_base(capsys: pytest.CaptureFixture[str]) -> None:
+    def found(*more: str) -> dict[str, Any]:
+        code, out, _ = call(capsys, "accuracy", UMK, "sigma_um=1.3", *more, "--format", "json")
+        assert code == 0
+        return json.loads(out)
+
+    one, other, both = found(), found("omega=25"), found("right.omega=25")
+    assert both["needed_arcsec"] == [
+        min(pair) for pair in zip(one["needed_arcsec"], other["needed_arcsec"], strict=True)
+    ]
+    assert both["needed_arcsec"][0] < one["needed_arcsec"][0]
+    for row in both["rounds"]:
+        sizes = row["sigma_horizontal_arcsec"], row["sigma_vertical_arcsec"]
+        counts = [math.ceil((size / need) ** 2) for size, need in zip(sizes, both["needed_arcsec"], strict=True)]
+        assert [row["horizontal"], row["vertical"]] == counts
+    assert {row["theodolite"]: row["rounds"] for row in one["rounds"]}["T2"] == 2  # (2 / 1.896)^2 = 1.1
+
+
 def test_theodolite_of_two_seconds_in_four_rounds(capsys: pytest.CaptureFixture[str]) -> None:
     command = ("theodolite", UMK, "sigma_arcsec=2", "rounds=4")
     found = answer(capsys, *command, "sigma_um=0.5")
