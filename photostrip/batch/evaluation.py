@@ -23,8 +23,7 @@ from photostrip.formats.text.table_text import LARGEST_TABLE
 from photostrip.geodesy.crs import grid_names
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
-from photostrip.project.yaml.reading import override, path_of, read_tree
-from photostrip.project.yaml.tree import Node
+from photostrip.project.reading import Node, override, path_of, read_tree
 from photostrip.report.page.messages import findings_of, line_of, result_findings
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, seen_at
 

@@ -125,11 +125,12 @@ def schema(
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
     ] = False,
-    result: Annotated[
-        bool, typer.Option("--result", help="What result.json may hold; written to FILE.md as a page of its keys.")
-    ] = False,
+    result: Annotated[bool, typer.Option("--result", help="What result.json may hold instead.")] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="File to write, FILE.md as a table of keys; default: stdout."
+        ),
     ] = None,
 ) -> None:
     """Print the JSON Schema of the project file, for editors.
@@ -138,15 +139,15 @@ def schema(
     project file with `# yaml-language-server: $schema=photostrip.schema.json`.
     """
     from photostrip.formats.text.writing import write_text
-    from photostrip.project.editors import schema_of
+    from photostrip.project.editors import keys_page, schema_of
     from photostrip.result.schema import result_page, result_schema
 
-    if result and output is not None and output.suffix == ".md":
-        write_text(output, result_page())
+    asked: dict[str, object] = {"tolerances": tolerances, "simulation": simulation, plan or "": plan}
+    asked |= {f"terrestrial {terrestrial}": terrestrial, f"step {step}": step}
+    kind = next((name for name, chosen in asked.items() if chosen), "project")
+    if output is not None and output.suffix == ".md":
+        write_text(output, result_page() if result else keys_page(kind))
         return
-    wanted: dict[str, object] = {"tolerances": tolerances, "simulation": simulation, plan or "": plan}
-    wanted |= {f"terrestrial {terrestrial}": terrestrial, f"step {step}": step}
-    kind = next((name for name, asked in wanted.items() if asked), "project")
     text = json.dumps(result_schema() if result else schema_of(kind), indent=2) + "\n"
     if output is None:
         sys.stdout.write(text)

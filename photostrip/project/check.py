@@ -30,8 +30,8 @@ from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, Strip, re
 from photostrip.pipeline.plausibility import gate
 from photostrip.points import PhotoPoints, locate
 from photostrip.project.loading import Project, read_project
+from photostrip.project.reading import fault_at, key_path
 from photostrip.project.tables import Tables, rays
-from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.strip import corrections
 from photostrip.units import MICROMETRES, MILLIMETRES
 

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.project import directions as keys
+from photostrip.project import terrestrial as keys
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.source_tree import ROOT
