@@ -542,7 +542,7 @@ def test_wrong_options_are_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFix
         (("nothing",), "nothing"),
         (("displacement", write(tmp_path), "--depfile", "d"), "--output"),
         (("displacement", write(tmp_path), "--format", "xml"), "xml"),
-        (("photo", "-o", "p.svg"), "may end in .json"),
+        (("photo", "-o", "p.svg"), "may end in .txt"),
     ]:
         code, out, err = call(capsys, *command)
         assert (code, out) == (2, "")
