@@ -84,7 +84,7 @@ def test_formulas_stand_alone(page: Path) -> None:
 def test_the_site_has_every_page_in_its_menu() -> None:
     menu = re.findall(r'"([\w/-]+\.md)"', (ROOT / "zensical.toml").read_text(encoding="utf-8"))
     assert len(menu) == len(set(menu))
-    made = [f"reference/{name}.md" for name in ("commands", "python", "result", "sources")]
+    made = [f"reference/{name}.md" for name in ("commands", "keys", "python", "result", "sources")]
     written = [page.relative_to(ROOT / "docs").as_posix() for page in pages() if page.name != "README.md"]
     assert sorted(menu) == sorted([*written, *made])
 

@@ -37,8 +37,8 @@ from photostrip.pipeline.inputs import (
 )
 from photostrip.points import PhotoPoints, locate
 from photostrip.project.loading import Project, read_project
+from photostrip.project.reading import fault_at, key_path
 from photostrip.project.tables import Tables, rays
-from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.strip import corrections
 from photostrip.units import MICROMETRES, MILLIMETRES
 

@@ -40,8 +40,8 @@ from photostrip.project.keys import (
     ProjectFile,
 )
 from photostrip.project.keys import CameraPositions as PositionsBlock
+from photostrip.project.reading import Node
 from photostrip.project.sections import Section
-from photostrip.project.yaml.tree import Node
 from photostrip.strip import fiducial_marks, formed_strip
 from photostrip.strip.fiducial_marks import Certificate
 from photostrip.strip.formed_strip import StripFormationSettings

@@ -21,7 +21,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from typing import Self
 
-    from photostrip.batch.tasks import Answer, Limits, Task
+    from photostrip.batch.evaluation import Answer, Limits, Task
 
 PHOTOS = 4
 NOT_RESULTS = {".batch.lock"}

@@ -15,12 +15,10 @@ import numpy as np
 import pytest
 
 from photostrip.batch import cluster as clusters
-from photostrip.batch.evaluation import evaluate
-from photostrip.batch.parcel import pack
-from photostrip.batch.result_folder import program
+from photostrip.batch.evaluation import Limits, Task, evaluate, pack
+from photostrip.batch.folder import program
 from photostrip.batch.run import Run, Stop
 from photostrip.batch.selection import choose
-from photostrip.batch.tasks import Limits, Task
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch import faulty

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.cli.jobs import batch as batch_job
+from photostrip.batch import pool
 from photostrip.cli.main import main
 from photostrip.formats.output.batch import parsed_record
 from photostrip.formats.text import writing
@@ -36,7 +36,7 @@ BATCH = ["batch", "strips", "-o", "out", "-j", "2"]
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_projects(tmp_path / "strips", PROJECTS)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_job, "LocalPool", Alone)
+    monkeypatch.setattr(pool, "LocalPool", Alone)
     return tmp_path
 
 

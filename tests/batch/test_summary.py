@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.batch.outcomes import EXIT_CODES, failure, not_run
+from photostrip.batch.evaluation import EXIT_CODES, failure, not_run
 from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.batch.result_folder import opened
-from photostrip.cli.jobs import batch as batch_job
+from photostrip.batch import pool
+from photostrip.batch.folder import opened
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from photostrip.formats.text import writing
@@ -29,7 +29,7 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_projects(tmp_path / "strips", 5)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_job, "LocalPool", Alone)
+    monkeypatch.setattr(pool, "LocalPool", Alone)
     return tmp_path
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.jobs import batch as batch_job
+from photostrip.batch import pool
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
 from photostrip.formats.output.result_json import read_result
@@ -33,7 +33,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Give a folder with three good projects and stand in it; they are computed in this process, without waiting."""
     write_projects(tmp_path / "strips", 3)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_job, "LocalPool", Alone)
+    monkeypatch.setattr(pool, "LocalPool", Alone)
     return tmp_path
 
 

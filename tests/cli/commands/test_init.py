@@ -131,11 +131,11 @@ def test_info_names_versions_threads_and_formats(capsys: pytest.CaptureFixture[s
 
 
 def test_info_says_how_to_get_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    from photostrip.cli.jobs import installation
+    from photostrip.cli import about
 
     lines = ["numpy>=1", "plotter-of-nothing>=3; extra == 'plots'", "pytest>=8; extra == 'test'"]
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: lines)
-    found = installation.installation()
+    found = about.installation()
     assert set(found["extras"]) == {"plots"}
     assert found["extras"]["plots"]["missing"] == ["plotter-of-nothing"]
-    assert "pip install 'photostrip[plots]'" in installation.as_text(found)
+    assert "pip install 'photostrip[plots]'" in "".join(about._lines(found))

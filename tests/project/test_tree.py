@@ -6,10 +6,10 @@ import pytest
 import yaml
 
 from photostrip.formats.text.findings import Findings
-from photostrip.project.yaml import tree
-from photostrip.project.yaml.tree import Node, Place, fault_at, key_path, parse
+from photostrip.project import reading
+from photostrip.project.reading import Node, Place, fault_at, key_path, parse
 
-LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(tree.LOADER, id="c")]
+LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(reading.LOADER, id="c")]
 TEXT = """\
 # a comment
 ключ: Значение
@@ -25,7 +25,7 @@ after: {x: 🛩️, y: yes}
 
 @pytest.fixture(params=LOADERS)
 def _loader(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tree, "LOADER", request.param)
+    monkeypatch.setattr(reading, "LOADER", request.param)
 
 
 def read(text: str) -> tuple[Node | None, Findings]:

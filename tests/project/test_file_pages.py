@@ -11,8 +11,7 @@ from photostrip.formats.measured.control import read_control
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.project.keys import ProjectFile
-from photostrip.project.yaml.reading import checked
-from photostrip.project.yaml.tree import parse
+from photostrip.project.reading import checked, parse
 from tests.pages import blocks
 from tests.project.samples import MARKED_FILES, sample
 from tests.source_tree import ROOT

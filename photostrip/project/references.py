@@ -13,7 +13,7 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.project.keys import ProjectFile
-from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
+from photostrip.project.reading import NO_FILES, KeyPath, Node, fault_at
 
 LEAST_MARKS = 2
 
@@ -23,11 +23,11 @@ class ListedPhoto:
     """One photo of a strip or of `photos`: its id, where it stands, and its camera."""
 
     id: str
-    path: Path
+    path: KeyPath
     camera: str
 
 
-def groups_of_photos(root: Node) -> Iterator[tuple[Path, Node]]:
+def groups_of_photos(root: Node) -> Iterator[tuple[KeyPath, Node]]:
     """Return the entries of `photos` and where they stand."""
     node = root.find("photos")
     if node is not None and node.entries:
@@ -43,7 +43,7 @@ def listed_photos(root: Node, measured: Sequence[str] = ()) -> Iterator[ListedPh
     """
     strips = [(("strips", i), strip) for i, strip in enumerate(root.list_at("strips"))]
     listed: set[str] = set()
-    others: list[tuple[Path, Node]] = []
+    others: list[tuple[KeyPath, Node]] = []
     for path, group in (*strips, *groups_of_photos(root)):
         for j, photo in enumerate(group.list_at("photos")):
             if photo.text:
@@ -145,7 +145,7 @@ def _strips(root: Node) -> Iterator[Fault]:
         yield from _known_camera(root, ("strips", number), strip)
 
 
-def _known_camera(root: Node, path: Path, group: Node) -> Iterator[Fault]:
+def _known_camera(root: Node, path: KeyPath, group: Node) -> Iterator[Fault]:
     known, camera = list(root.mapping_at("cameras")), group.word("camera")
     if camera and known and camera not in known:
         message = f"there is no camera `{shown(camera)}`"
@@ -155,7 +155,7 @@ def _known_camera(root: Node, path: Path, group: Node) -> Iterator[Fault]:
 
 def _photos_in_any_order(root: Node) -> Iterator[Fault]:
     """Refuse in `photos` what only strips can have, and a second entry for all that is listed nowhere."""
-    others: list[Path] = []
+    others: list[KeyPath] = []
     for path, group in groups_of_photos(root):
         yield from _known_camera(root, path, group)
         if group.entries and not group.has("photos"):
@@ -172,7 +172,7 @@ def _photos_in_any_order(root: Node) -> Iterator[Fault]:
 
 def _photos(root: Node) -> Iterator[Fault]:
     """Refuse a photo that is listed twice, in one place or in two."""
-    first: dict[str, Path] = {}
+    first: dict[str, KeyPath] = {}
     for photo in listed_photos(root):
         before = first.setdefault(photo.id, photo.path)
         if before == photo.path:
