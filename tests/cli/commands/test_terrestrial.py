@@ -148,6 +148,20 @@ def test_a_tilted_camera_has_a_table_of_the_whole_photo(answer: Answer) -> None:
     assert value[0, 60]["vertical_arcsec"] == value[0, -60]["vertical_arcsec"]
 
 
+def test_rounds_of_every_theodolite_for_the_stricter_end_of_the_base(answer: Answer) -> None:
+    command = ("accuracy", UMK, "sigma_um=1.3")
+    one, other, both = answer(*command), answer(*command, "omega=25"), answer(*command, "right.omega=25")
+    assert both["needed_arcsec"] == [
+        min(pair) for pair in zip(one["needed_arcsec"], other["needed_arcsec"], strict=True)
+    ]
+    assert both["needed_arcsec"][0] < one["needed_arcsec"][0]
+    for row in nonempty(both["rounds"]):
+        sizes = row["sigma_horizontal_arcsec"], row["sigma_vertical_arcsec"]
+        counts = [math.ceil((size / need) ** 2) for size, need in zip(sizes, both["needed_arcsec"], strict=True)]
+        assert [row["horizontal"], row["vertical"]] == counts
+    assert {row["theodolite"]: row["rounds"] for row in one["rounds"]}["T2"] == 2  # (2 / 1.896)^2 = 1.1
+
+
 def test_theodolite_of_two_seconds_in_four_rounds(said: Said, answer: Answer) -> None:
     command = ("theodolite", UMK, "sigma_arcsec=2", "rounds=4")
     found = answer(*command, "sigma_um=0.5")
@@ -484,8 +498,10 @@ WHOLE = "camera={principal_distance: 100, format: [100, 80]}"
         (("photo", D100, "table=behind.csv"), "behind.csv:4:5: beta: the direction to point C is not below the zenith; expected an elevation between -90 and 90 degrees"),
         (("accuracy", D100), "--set: camera.format: the camera camera has no format; expected [width, height] in mm"),
         (("theodolite", WHOLE), "--set: nothing says how well directions are measured; expected `sigma_arcsec` or `theodolite`"),
-        (("theodolite", WHOLE, "theodolite=T2"), "--set: theodolite: `T2` is not known; expected one of Theo 010, Theo 020, Theo 080"),
+        (("theodolite", WHOLE, "theodolite=T3"), "--set: theodolite: `T3` is not known; expected one of Theo 010, Theo 020, Theo 080, T2"),
         (("theodolite", WHOLE, "theodolite=Theo 010", "sigma_arcsec=1"), "--set: sigma_arcsec: the theodolite and its standard deviation are both given"),
+        (("accuracy", WHOLE, "right.omega=90"), "--set: right.omega: with 90 deg the camera looks straight up or down, and has no azimuth"),
+        (("accuracy", WHOLE, "as_printed=true", "right.omega=3"), "--set: as_printed: the printed formulas hold for a level camera"),
         (("accuracy", WHOLE, "step=0.1"), "--set: step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
         (("accuracy", WHOLE, "as_printed=true", "omega=3"), "--set: as_printed: the printed formulas hold for a level camera; leave out `omega` and `kappa`"),
         (("orientation", D100, "table=sights.csv", "free=[f]"), "--set: free[0]: `f` is not known; expected one of principal-distance, principal-point, refraction"),
