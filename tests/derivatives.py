@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.pipeline.formed_photos import FormedPhotos
-from photostrip.pipeline.photos_on_control import OrientedPhotos, OrientedStrip
 from photostrip.pipeline.precision import fitted
 from photostrip.pipeline.run import triangulate
+from photostrip.pipeline.strip_method import OrientedStrip
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
 from photostrip.strip.relative_orientation import RelativeSettings
@@ -51,25 +51,19 @@ def without_noise(wanted: Spec) -> Inputs:
 
 
 def fitted_strip(result: Result, factor: float = 1.0) -> FittedStrip:
-    """Errors of the strip of a result after its fit to the control."""
-    return fitted(result.strips[0], oriented_of(result), factor)
-
-
-def oriented_of(result: Result, number: int = 0) -> OrientedPhotos:
-    """Return a strip of a result as it lay on its control before its deformation was corrected."""
-    strip = result.strips[number]
+    """Errors of the first strip of a result after its fit to the control, before which it lay there undeformed."""
+    strip, observations = result.strips[0], result.refined.observations
     photos = strip.of_photos
     stage = FormedPhotos(
         strip=photos.strip,
-        observations=result.refined.observations,
+        observations=observations,
         sigma=photos.sigma,
         screened=photos.screened,
         formed=photos.formed,
         wrong_rays=photos.wrong_rays,
     )
     oriented = OrientedStrip(
-        strip=photos.strip,
-        formed=photos.formed,
+        stage=stage,
         frames=result.frames,
         control=strip.control,
         control_rows=strip.control_rows,
@@ -78,7 +72,7 @@ def oriented_of(result: Result, number: int = 0) -> OrientedPhotos:
         precision=strip.precision,
         settings=result.settings.absolute,
     )
-    return OrientedPhotos(stage, oriented)
+    return fitted(strip, oriented, observations, factor)
 
 
 def written_out(errors: StripErrors, rows: csr_array) -> Floats:

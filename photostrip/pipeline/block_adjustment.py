@@ -27,6 +27,7 @@ from photostrip.notes import Note
 from photostrip.pipeline import block_problem, block_start
 from photostrip.pipeline import block_problem as block_models
 from photostrip.pipeline.block_start import known_of
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import axes_of, compare_with_given
@@ -43,7 +44,7 @@ from photostrip.pipeline.results import (
     StripResult,
     Ties,
 )
-from photostrip.pipeline.strip_method import LinkedModels, depth_of
+from photostrip.pipeline.strip_method import depth_of
 from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.rejection import Rejection
 from photostrip.statistics import TEST_LEVEL

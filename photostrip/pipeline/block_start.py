@@ -31,14 +31,14 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Note
 from photostrip.pipeline import block_problem
 from photostrip.pipeline.block_problem import LEAST_FAR
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import cartesian_of, measured_control
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.photos_on_control import middle_frame
 from photostrip.pipeline.precision import compared_strips, mean_points
 from photostrip.pipeline.results import BlockStart, StripResult
-from photostrip.pipeline.strip_method import LinkedModels, adjust_formed
+from photostrip.pipeline.strip_method import adjust_formed, middle_frame
 from photostrip.plausibility.ids import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.strip import absolute_orientation

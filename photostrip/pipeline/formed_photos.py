@@ -285,6 +285,17 @@ class FormedPhotos:
         errors = differentiate_strip(self.orientation, self.formed, similarity, self.observations.sigma)
         return errors.with_doubt(self.formed.junctions.doubt / np.sqrt(self.excess))
 
+    def covariance(self, similarity: Similarity) -> Callable[[Numbers, Floats], Floats]:
+        """Give the covariance of coordinates along directions (w, 3) of rows (w,) of its points, after a similarity."""
+        errors = self.errors(similarity)
+
+        def of(row: Numbers, direction: Floats) -> Floats:
+            along = errors.along(row, direction)
+            first, _ = errors.frames(along)  # no test depends on what moves the whole section
+            return errors.joint_covariance(along, first) * self.excess
+
+        return of
+
     def as_left_by(self, stages: PhotoStages) -> FormedPhotos:
         """Form nothing again: the strip without the wrong images of control that an adjustment found in it."""
         return replace(self, formed=stages.formed, wrong_rays=stages.wrong_rays)

@@ -22,13 +22,13 @@ from photostrip.notes import Finding
 from photostrip.pipeline import evidence, given_on_ground, shared_errors
 from photostrip.pipeline.control_readings import find_distance
 from photostrip.pipeline.evidence import of_images, of_units
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import GroundFrames, PhotoCoordinates
 from photostrip.pipeline.given_on_ground import GivenControl, Predicted
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
 from photostrip.pipeline.precision import compared_strips
 from photostrip.pipeline.results import Bundle, Result, StripResult
-from photostrip.pipeline.strip_method import LinkedModels
 from photostrip.plausibility import accepted, flight, ids, units
 from photostrip.plausibility.ids import OrientedRays
 from photostrip.points import PhotoPoints
