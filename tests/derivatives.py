@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.precision import fitted
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strip_method import OrientedStrip
@@ -53,17 +52,8 @@ def without_noise(wanted: Spec) -> Inputs:
 def fitted_strip(result: Result, factor: float = 1.0) -> FittedStrip:
     """Errors of the first strip of a result after its fit to the control, before which it lay there undeformed."""
     strip, observations = result.strips[0], result.refined.observations
-    photos = strip.of_photos
-    stage = FormedPhotos(
-        strip=photos.strip,
-        observations=observations,
-        sigma=photos.sigma,
-        screened=photos.screened,
-        formed=photos.formed,
-        wrong_rays=photos.wrong_rays,
-    )
     oriented = OrientedStrip(
-        stage=stage,
+        stage=strip.of_photos,
         frames=result.frames,
         control=strip.control,
         control_rows=strip.control_rows,
@@ -97,11 +87,11 @@ class Placed:
         """Bring a result into a frame."""
         strip = result.strips[0]
         there = strip.intermediate
-        centers = there.cartesian_from_intermediate(strip.of_photos.resection.centers)
+        centers = there.cartesian_from_intermediate(strip.resection.centers)
         return cls(
             frame.intermediate_from_cartesian(strip.cartesian),
             frame.intermediate_from_cartesian(centers),
-            frame.intermediate_rotations(there.cartesian_rotations(strip.of_photos.resection.rotations)),
+            frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations)),
         )
 
     def minus(self, other: Placed) -> tuple[Floats, Floats]:

@@ -303,7 +303,7 @@ def _begin(
     used = np.zeros(int(rows.max(initial=-1)) + 1, bool)
     paired = np.zeros(len(used), bool)
     for strip in start.strips:
-        used[strip.of_photos.rows[strip.of_photos.rows < len(used)]] = True
+        used[strip.rows[strip.rows < len(used)]] = True
         in_pairs = np.unique(strip.of_photos.orientation.rows)
         paired[in_pairs[in_pairs < len(used)]] = True
     inside = used[rows]
@@ -353,7 +353,7 @@ def models_together(
     nodes[found.number] = found.xyz
     for strip in strips:
         places = count + locate(strip.strip.photos, measured.photo_ids)
-        nodes[places] = strip.intermediate.cartesian_from_intermediate(strip.centers)
+        nodes[places] = strip.intermediate.cartesian_from_intermediate(strip.placed.centers)
     names, unit = units_of(models)
     centred = _centred(measured)
     placed = []

@@ -418,8 +418,8 @@ def _together(
     points = _mean_points(strips, len(observations.point_ids), strangers)
     oriented: dict[str, tuple[Floats, Floats]] = {}
     for strip in strips:
-        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
-        turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
+        centers = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
+        turned = strip.intermediate.cartesian_rotations(strip.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
     given = None if strips else points_as_given(inputs, observations, known.orientations)
     points = _with_control(points if given is None else given, observations, known)

@@ -38,7 +38,6 @@ from photostrip.pipeline.formed_photos import FormedPhotos, form_strip
 from photostrip.pipeline.frames import PhotoCoordinates
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
-from photostrip.pipeline.results import PhotoStages
 from photostrip.pipeline.strip_method import OrientedStrip, orient_on_control, strip_at_control
 from photostrip.plausibility import accepted, flight, units
 from photostrip.plausibility.given_points import far_away
@@ -90,18 +89,6 @@ def formed_at_distance(stage: FormedPhotos, factor: float, settings: Settings) -
     except (GeometryError, np.linalg.LinAlgError):
         return None
     return form(strip, rays, plain) if usable else None
-
-
-def as_formed(stages: PhotoStages, observations: PhotoPoints) -> FormedPhotos:
-    """Return a strip as a run has formed it, before it met its control."""
-    return FormedPhotos(
-        strip=stages.strip,
-        observations=observations,
-        sigma=stages.sigma,
-        screened=stages.screened,
-        formed=stages.formed,
-        wrong_rays=stages.wrong_rays,
-    )
 
 
 def up(stage: FormedPhotos) -> Floats:

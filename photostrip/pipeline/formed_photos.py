@@ -31,7 +31,6 @@ from photostrip.network.problem import BundleCameras, BundleProblem, BundleSetti
 from photostrip.network.snooping import screen_bundle
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import Inputs, Settings, Strip, kept_rows, rows_of
-from photostrip.pipeline.results import PhotoStages
 from photostrip.plausibility import mosaic
 from photostrip.points import PhotoPoints
 from photostrip.rejection import SEVERAL_RAYS, Rejection
@@ -296,9 +295,10 @@ class FormedPhotos:
 
         return of
 
-    def as_left_by(self, stages: PhotoStages) -> FormedPhotos:
-        """Form nothing again: the strip without the wrong images of control that an adjustment found in it."""
-        return replace(self, formed=stages.formed, wrong_rays=stages.wrong_rays)
+    @property
+    def rejections(self) -> tuple[Rejection, ...]:
+        """Points taken out of pairs."""
+        return self.screened.rejections
 
     def without_images(self, wrong: Mapping[str, Rejection]) -> FormedPhotos:
         o, photo = self.observations, self.strip.positions(self.observations)

@@ -353,7 +353,7 @@ def precision_of_photos(
         points[checks.rows] = found.covariances_of_points(checks.rows)
     else:
         points = found.covariances_of_points(np.arange(len(points)))
-        solved = np.flatnonzero(strip.of_photos.resection.solved)
+        solved = np.flatnonzero(strip.resection.solved)
         by_photo = photo_errors(strip, found.errors, observations)
         photos[solved] = found.covariances_of_photos(by_photo, solved)
     axes, fit = strip.intermediate.axes, found.fit
@@ -371,8 +371,7 @@ def precision_of_photos(
 
 def too_long(strip: StripResult) -> bool:
     """Whether a strip was fitted to its control that has too many photos for the covariances of all its points."""
-    stages = strip.photo_stages
-    return stages is not None and len(stages.strip.photos) > MOST_PHOTOS
+    return not strip.is_of_models and len(strip.strip.photos) > MOST_PHOTOS
 
 
 def _control_of(strip: StripResult, point: Numbers, axis: Numbers) -> Numbers:
@@ -398,10 +397,10 @@ def fitted(strip: StripResult, oriented: OrientedStrip, observations: PhotoPoint
 
 def photo_errors(strip: StripResult, errors: StripErrors, observations: PhotoPoints) -> PhotoErrors:
     """Differentiate the orientation of the photos on their adjusted points."""
-    rows = strip.of_photos.rows
+    rows = strip.rows
     photo = strip.of_photos.strip.positions(observations)[rows]
     point = np.searchsorted(strip.formed.point, observations.point[rows])
-    return differentiate_photos(errors, strip.of_photos.resection, strip.xyz, photo, point, rows)
+    return differentiate_photos(errors, strip.resection, strip.xyz, photo, point, rows)
 
 
 def joint_covariance(result: Result, rows: Numbers) -> Floats:

@@ -36,7 +36,7 @@ from photostrip.pipeline.inputs import (
     require_named,
     require_weighted,
 )
-from photostrip.pipeline.results import ModelStages, PhotoStages, StripResult
+from photostrip.pipeline.results import PlacedModels, StripResult
 from photostrip.plausibility.given_points import find_shared
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip import (
@@ -369,6 +369,7 @@ def adjusted(screened: ScreenedStrip, settings: Settings) -> StripResult:
     held = *notes.control_notes(strip, oriented.absolute), *notes.polynomial_notes(strip, correction, xyz)
     result = partial(
         StripResult,
+        stage=stage,
         precision=oriented.precision,
         intermediate=frame,
         control=oriented.control,
@@ -386,13 +387,12 @@ def adjusted(screened: ScreenedStrip, settings: Settings) -> StripResult:
             rays=formed.photo_count,
             depth=depth_of(centers, xyz),
             notes=(*notes.link_notes(stage.strip, stage.measured, formed), *wrong, *held),
-            model_stages=ModelStages(
-                strip=stage.strip,
-                formed=formed,
+            placed=PlacedModels(
                 centers=centers,
                 rotations=similarity.rotation @ formed.places.rotation,
                 scales=similarity.scale * formed.places.scale * MILLIMETRES,
             ),
+            rows=np.zeros(0, np.intp),
         )
     rows = stage.rays_in_use
     photo = stage.strip.positions(stage.observations)[rows]
@@ -413,15 +413,8 @@ def adjusted(screened: ScreenedStrip, settings: Settings) -> StripResult:
             *([] if correction is None else notes.network_proposal(stage.strip, correction)),
             *notes.photo_notes(stage.strip, resection),
         ),
-        photo_stages=PhotoStages(
-            strip=stage.strip,
-            sigma=stage.sigma,
-            screened=stage.screened,
-            formed=stage.formed,
-            wrong_rays=stage.wrong_rays,
-            resection=resection,
-            rows=rows,
-        ),
+        placed=resection,
+        rows=rows,
     )
 
 

@@ -21,7 +21,7 @@ def discrepancies(strip: StripResult) -> Floats:
     Returns (t, 3), metres along the strip, to its left and up, of every pass point of every junction, or of everything
         common to two independent models; NaN where its rays were left out.
     """
-    formed = strip.of_photos.formed if strip.model_stages is None else strip.of_models.formed
+    formed = strip.of_photos.formed if not strip.is_of_models else strip.of_models.formed
     common = formed.junctions if isinstance(formed, FormedStrip) else formed.links.shared
     gap = formed.model_xyz[common.after] - formed.model_xyz[common.before]
     similarity = strip.absolute.similarity

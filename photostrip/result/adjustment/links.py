@@ -52,11 +52,11 @@ def _models(strip: StripResult) -> Table:
         "points_rejected": np.bincount(models.model[point], minlength=models.count) - used,
         "centers": np.bincount(models.model[~point], minlength=models.count),
         "redundancy": None,
-        "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
+        "base": np.linalg.norm(np.diff(strip.placed.centers, axis=0), axis=1),
         "base_formed": np.linalg.norm(np.diff(formed.centers, axis=0), axis=1) * strip.absolute.similarity.scale,
         "scale_factor": formed.places.scale,
-        "model_scale": strip.of_models.scales,
-        **dict(zip(MATRIX, strip.of_models.rotations.reshape(-1, 9).T, strict=True)),
+        "model_scale": strip.models.scales,
+        **dict(zip(MATRIX, strip.models.rotations.reshape(-1, 9).T, strict=True)),
     }
     return Table.of("models", columns)
 

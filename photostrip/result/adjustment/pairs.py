@@ -9,7 +9,8 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.pipeline.results import PhotoStages, Result, StripResult
+from photostrip.pipeline.formed_photos import FormedPhotos
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.numbers import order_of
 from photostrip.result.table import Table
 from photostrip.strip.formed_strip import base_angles
@@ -80,7 +81,7 @@ def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) 
         "masked_errors_suspected": stages.screened.masked,
         "condition": oriented.condition,
         "iterations": oriented.iterations,
-        "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
+        "base": np.linalg.norm(np.diff(strip.placed.centers, axis=0), axis=1),
         "scale_factor": formed.scale_factor,
         "base_direction_deg": np.degrees(formed.base_direction),
         "base_inclination_deg": np.degrees(formed.base_inclination),
@@ -140,7 +141,7 @@ def parallaxes_of(result: Result, rank: Numbers) -> Table:
     return Table.joined("parallaxes", found)
 
 
-def _parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:
+def _parallax_limits(of_photos: FormedPhotos, settings: RelativeSettings) -> Floats:
     """Median parallax of each pair, mm, from which on the search takes a point out; NaN where nothing is tested.
 
     A limit that depends on the redundancy of a point is smaller where there is little of it.

@@ -22,10 +22,10 @@ from photostrip.strip.polynomial import Polynomial, degree_of
 
 def strip_of(result: Result, strip: StripResult) -> Document:
     """Return a row of ``strips``: what a strip is like and how well it holds together."""
-    of_photos = strip.model_stages is None
+    of_photos = not strip.is_of_models
     formed = strip.of_photos.formed.junctions if of_photos else strip.of_models.formed.links
     gap = discrepancies(strip)[formed.used]  # rms() passes over points left out for their rays
-    base = np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)
+    base = np.linalg.norm(np.diff(strip.placed.centers, axis=0), axis=1)
     base = base[np.isfinite(base)]
     return {
         "id": strip.strip.id,
@@ -48,13 +48,13 @@ def strip_of(result: Result, strip: StripResult) -> Document:
 
 
 def _fit_of_photos(result: Result, strip: StripResult) -> Document:
-    sums, stages = pairs.Parallaxes.of(strip), strip.of_photos
+    sums, oriented = pairs.Parallaxes.of(strip), strip.of_photos.orientation
     return {
-        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[stages.rows]),
+        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[strip.rows]),
         "sigma0_um": 1000.0 * pairs.sigma0(sums.squares, sums.redundancy),
         "redundancy": int(sums.redundancy.sum()),
-        "rms_parallax_um": 1000.0 * rms(stages.orientation.parallax[stages.orientation.used]),
-        "image_rms_um": 1000.0 * rms(stages.resection.residuals),
+        "rms_parallax_um": 1000.0 * rms(oriented.parallax[oriented.used]),
+        "image_rms_um": 1000.0 * rms(strip.resection.residuals),
     }
 
 
@@ -85,7 +85,7 @@ def _found_drift(strip: StripResult) -> float:
     correction = strip.polynomial
     if correction is None or not correction.axes[0].terms:
         return np.nan
-    start, end = (_scale_change(correction, x) for x in strip.centers[[0, -1], 0])
+    start, end = (_scale_change(correction, x) for x in strip.placed.centers[[0, -1], 0])
     return end - start
 
 
