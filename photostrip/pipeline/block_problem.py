@@ -27,7 +27,6 @@ from photostrip.network.problem import (
     BundleProblem,
     ControlObservations,
     ImageObservations,
-    ModelObservations,
     PositionObservations,
     StartValues,
 )
@@ -411,14 +410,14 @@ def build_models(
     rows = np.flatnonzero(~rows_of_models(settings.links.drop, measured) & (unit >= 0))
     given, control_rows = control_observations(control, ground.control, observations, start, origin)
     problem = BundleProblem(
-        images=ModelObservations(
+        images=ImageObservations(
             photo=unit[rows],
             point=measured.node[rows],
             xy=_centred(measured)[rows],
             sigma=measured.sigma[rows],
             correlation=None if measured.correlation is None else measured.correlation[rows],
         ),
-        cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
+        cameras=BundleCameras(),
         start=StartValues(
             centers=start.centers - origin,
             rotations=start.rotations,

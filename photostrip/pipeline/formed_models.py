@@ -12,7 +12,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.adjustment import BundleSolution, solve
-from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
+from photostrip.network.problem import BundleCameras, BundleProblem, ImageObservations, StartValues
 from photostrip.network.reliability import joint_cofactors
 from photostrip.pipeline.inputs import (
     ModelStrip,
@@ -85,14 +85,14 @@ def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> 
     nodes[formed.node] = formed.node_xyz
     network = solve(
         BundleProblem(
-            images=ModelObservations(
+            images=ImageObservations(
                 photo=models.model[rows],
                 point=models.node[rows],
                 xy=models.xyz[rows],
                 sigma=models.sigma[rows],
                 correlation=None if measured.correlation is None else measured.correlation[of_project],
             ),
-            cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
+            cameras=BundleCameras(),
             start=StartValues(centers=places.shift, rotations=places.rotation, points=nodes, scales=places.scale),
             photo_ids=strip.models,
             point_ids=tuple(map(measured.name, range(len(nodes)))),
