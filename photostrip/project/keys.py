@@ -765,7 +765,7 @@ ENDINGS = {
 }
 ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
-TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined", "reliability", "links")  # of a run
+TABLES = ("points", "photos", "residuals", "rejected", "refined", "reliability", "links")  # of a run
 
 
 def form_of(target: str, asked: str = "") -> str:
