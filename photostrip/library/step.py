@@ -21,8 +21,7 @@ from photostrip.camera import Camera, Distortion
 from photostrip.formats.measured.steps import read_rays, read_step
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
 from photostrip.library import steps
-from photostrip.library.step_arguments import Rays, of_rays, sigma0_of
-from photostrip.library.steps import Bundle, Strip, one_pair
+from photostrip.library.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.project import plans as keys
 from photostrip.project.reading import read_keys
 from photostrip.project.sections import Section

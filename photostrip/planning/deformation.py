@@ -42,6 +42,23 @@ LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is most
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
 
 
+def relative_errors(
+    image: ArrayLike, focal: float, errors: ArrayLike, *, base: float = 0.0, principal_distance: float = 0.0
+) -> Floats:
+    """Relative errors dX/X, dY/Y, dZ/Z (..., 3) of points of the normal case: X = N x, Y = N y, Z = -N f, N = B/p.
+
+    image, errors: (..., 3), x, y and x parallax p of the left photo, and their errors, mm; y and x must not be zero.
+    base: relative error of the base B.
+    principal_distance: error of f, mm.
+
+    Source: [003] eq. 10.7.
+    """
+    x, y, p = np.moveaxis(np.asarray(image, float), -1, 0)
+    dx, dy, dp = np.moveaxis(np.asarray(errors, float), -1, 0)
+    common = base - dp / p
+    return np.stack(np.broadcast_arrays(common + dx / x, common + dy / y, common + principal_distance / focal), axis=-1)
+
+
 def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float) -> Floats:
     """Return the quantity c, mm, that errors of the elements go through (eq. 10.8, without that of the x parallax).
 
@@ -303,6 +320,7 @@ class BentModel:
     """The surface into which errors of the elements bend a model."""
 
     surface: Floats  # (5,): E0, A, B, C, D of the heights, for x and y in mm at photo scale
+    c: Floats  # (q,): what the elements add to the x parallax, eq. 10.9, mm
     raised: Floats  # (q, 3): errors of points in the base frame, eq. 10.8: plan by the left ray, heights by the surface
     left: Floats  # (q, 3): what the absolute orientation leaves of the errors
 
@@ -316,6 +334,7 @@ def bend_model(points: Floats, control: ModelControl, base: float, focal: float,
     parts = error_parts(points, np.zeros_like(points), control, ControlErrors(none, none), base, elements)
     return BentModel(
         surface=surface_of_elements(turned, 1.0, focal, base),
+        c=c,
         raised=np.column_stack([xy / base * c[:, None], -focal / base * c]),
         left=parts.from_elements,
     )

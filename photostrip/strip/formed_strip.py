@@ -217,6 +217,17 @@ def place_models(
     )
 
 
+def base_frames(rotations: Floats, elements: Floats) -> Floats:
+    """Rotations A_taunu (p, 3, 3) from base frames to the strip: A1 A(alpha1', 0, kappa1')^T, first column the base.
+
+    rotations, elements: (p, 3, 3) and (p, 5), of the left photos to the strip, and relative to their bases.
+
+    Source: [001] eq. 128.
+    """
+    left = np.asarray(from_alpha_omega_kappa(elements[:, 0], 0.0, elements[:, 1]), float)
+    return np.asarray(rotations @ np.swapaxes(left, 1, 2), float)
+
+
 def base_angles(directions: Floats) -> tuple[Floats, Floats]:
     """Direction tau and inclination nu of unit vectors of bases (..., 3), radians; [001] eq. 128-130."""
     x, y, z = np.moveaxis(directions, -1, 0)

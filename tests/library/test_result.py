@@ -21,6 +21,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 SAMPLE = ROOT / "sample_data/simulated-20/project.yaml"
@@ -275,9 +277,7 @@ def test_without_precision_covariances_are_not_known() -> None:
 
 
 @pytest.mark.slow
-def test_reports_are_those_of_the_command(
-    result: photostrip.Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_reports_are_those_of_the_command(result: photostrip.Result, tmp_path: Path, capsys: Capture) -> None:
     result.write(tmp_path)
     assert main(["report", str(tmp_path), "--verbose"]) == 0
     assert capsys.readouterr().out == result.report()

@@ -367,8 +367,9 @@ def _finding(
     problem = bundle.screened.problem
     rows = np.flatnonzero(problem.positions.group == group)
     axes = problem.position_axes
-    whose = "the camera positions" if error.of == ALL else f"the camera positions of strip {problem.group_ids[group]}"
-    message = f"{whose} all lie {_steps(offset, axes)} from where control and photos put them"
+    name = problem.group_ids[group]
+    whose = "" if error.of == ALL else f" {name}" if name.startswith("of the ") else f" of strip {name}"
+    message = f"the camera positions{whose} all lie {_steps(offset, axes)} from where control and photos put them"
     evidence = _numbers("offset", offset, axes)
     correction = "offset"
     if drift is not None:

@@ -14,8 +14,8 @@ from functools import cache
 from pathlib import Path
 
 from photostrip import __version__
+from photostrip.batch.evaluation import Answer
 from photostrip.batch.selection import ChosenProject
-from photostrip.batch.tasks import Answer
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
 from photostrip.formats.text.files import LARGEST_FILE, from_disk
