@@ -10,12 +10,9 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.table import Table
-from photostrip.strip.pair_screening import SEARCHES, tested
+from photostrip.strip.pair_screening import SEARCHES, GlobalTest, residual_sigma, tested
 from photostrip.strip.pair_screening import stages as tests_of
-from photostrip.strip.pair_search import GlobalTest, residual_sigma
-from photostrip.strip.relative_orientation.orientation import RelativeSettings
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.relative_orientation import ELEMENTS, MINIMUM_POINTS, RelativeSettings
 
 
 @dataclass(frozen=True, eq=False)

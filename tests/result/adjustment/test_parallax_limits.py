@@ -13,7 +13,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.result import pictures_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
-from photostrip.strip.pair_search import GlobalTest
+from photostrip.strip.pair_screening import GlobalTest
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
 from tests.simulated import inputs_of
