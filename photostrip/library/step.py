@@ -30,9 +30,9 @@ from photostrip.sheets.replay import first_rounds
 from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
-from photostrip.strip.intersection import lies_across
-from photostrip.strip.polynomial_terms import columns as design_columns
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.formed_strip import lies_across
+from photostrip.strip.polynomial import term_columns as design_columns
+from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, approximate, project, resect
 from photostrip.units import MICROMETRES
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from tests.calls import Capture
     from tests.results import Case
 
     Document = dict[str, Any]
@@ -264,15 +265,6 @@ def test_the_preset_for_teaching_gives_a_trace_in_gon(tmp_path: Path, ending: st
         assert "gon" in text
 
 
-def test_an_ending_that_is_not_known_is_refused_before_the_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    project = write_project(tmp_path, spec())
-    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "t.pdf")]) == 2
-    assert "--trace" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 AS_PRINTED = f"extends: {ROOT / 'configs/as-printed.yaml'}\n"
 FIRST = "    first_photo: {angles: [2.0, -3.0, 12.0], unit: gon, base: 92.0}\n"
 
@@ -287,7 +279,7 @@ def as_printed(folder: Path, *options: str) -> Document:
 
 
 @pytest.mark.slow
-def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: Capture) -> None:
     capsys.readouterr()
     document = as_printed(tmp_path)
     assert document["departures"] == []
