@@ -244,9 +244,21 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows))
 
 
+def rooms() -> str:
+    """List the rooms of the program with what their docstrings say first."""
+    root = Path(photostrip.__file__).parent
+    rows = [
+        (f"`{folder.parent.relative_to(root).as_posix()}/`",
+         (ast.get_docstring(ast.parse(folder.read_text(encoding="utf-8"))) or "").partition("\n")[0].replace("``", "`"))
+        for folder in sorted(root.rglob("__init__.py"))[1:]
+    ]  # fmt: skip
+    return _table(("room", "what it holds"), rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "causes": causes,
     "findings": findings,
+    "rooms": rooms,
     "project": lambda: keys_page("project"),
     "simulation": lambda: keys_page("simulation"),
 }

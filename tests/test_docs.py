@@ -89,6 +89,14 @@ def test_the_site_has_every_page_in_its_menu() -> None:
     assert sorted(menu) == sorted([*written, *made])
 
 
+def test_headings_have_the_words_that_newcomers_search_for() -> None:
+    table = (ROOT / "docs/tests.md").read_text(encoding="utf-8").partition("| search | page |")[2].partition("\n\n")[0]
+    for words, page in nonempty(re.findall(r"\| ([\w ]+) \| ([\w/-]+\.md) \|", table)):
+        headings = re.findall(r"(?m)^#+ .+$", (ROOT / "docs" / page).read_text(encoding="utf-8"))
+        asked = set(words.lower().split())
+        assert any(asked <= set(re.findall(r"\w+", heading.lower())) for heading in headings), words
+
+
 def test_no_page_of_the_site_links_out_of_it() -> None:
     for page in nonempty(pages()[1:]):
         for target in LINK.findall(page.read_text(encoding="utf-8")):
