@@ -3,8 +3,8 @@
 Image coordinates are millimetres, x to the right and y up, reduced to the principal point but in ``interior`` and
 ``refine``; the principal distance is in millimetres, angles in radians. Models have the unit of the base that is given;
 ground coordinates are Cartesian, metres: tangent plane, geocentric, or a map where its curvature does not matter.
-Rotations take image axes, or those of a model, to the axes named beside them; ``from_angles([0.01, 0.02, 0.5],
-"alpha-omega-kappa")`` makes them of angles, ``angles(rotation, "alpha-omega-kappa")`` gives these back.
+Rotations take image axes, or those of a model, to the axes named beside them. ``from_angles`` makes them of angles in a
+system, as ``"alpha-omega-kappa"``, ``angles`` gives these back.
 """
 
 from __future__ import annotations
