@@ -34,19 +34,23 @@ from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_an
 from photostrip.geometry.similarity import PairScales, Similarity, collinearity
 from photostrip.geometry.similarity import pair_scales as distances
 from photostrip.network.adjustment import IterationStep, solve
-from photostrip.network.cofactors import cofactors_of
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
+from photostrip.network.reliability import cofactors_of
 from photostrip.planning.closed_form import coefficients, control_sums
 from photostrip.planning.deformation import Paraboloid, fit_paraboloid
 from photostrip.points import PhotoPoints
 from photostrip.strip.corrections import Bending, refraction_constant, undistort
-from photostrip.strip.formed_strip import FirstPhoto, form_from_pairs, hand_on_rotations
-from photostrip.strip.intersection import Intersection, intersect
-from photostrip.strip.polynomial_terms import POWERS, columns
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs, collect_pairs
+from photostrip.strip.formed_strip import (
+    FirstPhoto,
+    Intersection,
+    StripFormationSettings,
+    form_from_pairs,
+    hand_on_rotations,
+    intersect,
+)
+from photostrip.strip.polynomial import POWERS, term_columns
+from photostrip.strip.relative_orientation import MINIMUM_POINTS, Pairs, collect_pairs, orient_pairs
 from photostrip.strip.resection import OrientedPhoto, space_resection
-from photostrip.strip.scale_transfer import StripFormationSettings
 
 __all__ = [
     "Absolute",
@@ -450,7 +454,7 @@ def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> 
     """
     if unknown := [each for each in terms if each not in POWERS] or ([] if terms else [""]):
         raise InputError(f"there is no term {unknown[0]!r}: {', '.join(POWERS)}")
-    design = columns(_array(xyz, 3), list(terms))
+    design = term_columns(_array(xyz, 3), list(terms))
     size = np.linalg.norm(design, axis=0)
     values = _array(np.reshape(misclosures, (-1, 1)), 1)[:, 0]
     _same(design, values)

@@ -64,7 +64,7 @@ def report(
     from photostrip.result.verdict import exit_code
 
     wanted = form or form_of(output or Path(), "--output")
-    refuse_sections(section, "HTML" if wanted == "html" else wanted)
+    refuse_sections(section, wanted)
     file = _saved(result)
     saved = read_result(file)
     with faults_of_edited("reported", (saved, file)):

@@ -103,13 +103,8 @@ class Result:
 
     @cached_property
     def residuals(self) -> Table:
-        """Image residuals under the final orientations, a row for each ray."""
+        """Image residuals under the final orientations, a row for each ray; y parallaxes of the pairs."""
         return self._table("residuals")
-
-    @cached_property
-    def parallaxes(self) -> Table:
-        """Residual y parallaxes, a row for each point of each pair."""
-        return self._table("parallaxes")
 
     @cached_property
     def rejected(self) -> Table:

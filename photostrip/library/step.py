@@ -35,10 +35,9 @@ from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
 from photostrip.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
-from photostrip.strip.formed_strip import base_angles, base_frames
-from photostrip.strip.intersection import lies_across
-from photostrip.strip.polynomial_terms import columns as design_columns
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.formed_strip import base_angles, base_frames, lies_across
+from photostrip.strip.polynomial import term_columns as design_columns
+from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, approximate, project, resect
 from photostrip.units import MICROMETRES
 

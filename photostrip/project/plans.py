@@ -50,8 +50,8 @@ from photostrip.project.simulation import SimulatedCamera, camera_of
 from photostrip.project.terrestrial import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
 from photostrip.project.terrestrial import Camera as Phototheodolite
 from photostrip.simulation import Points
-from photostrip.strip.polynomial_terms import POWERS
-from photostrip.strip.relative_orientation.orientation import SCREENINGS
+from photostrip.strip.polynomial import POWERS
+from photostrip.strip.relative_orientation import SCREENINGS
 from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 

@@ -21,8 +21,8 @@ from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidd
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
 from photostrip.strip.pair_screening import stages, tested
-from photostrip.strip.polynomial_terms import POWERS, degree_of
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.polynomial import POWERS, degree_of
+from photostrip.strip.relative_orientation import ELEMENTS
 
 CUBIC = 3  # degree of eq. 150
 DEGREE = "polynomial.degree"

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.batch import pool
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
 from photostrip.formats.output.result_json import read_result
@@ -21,20 +20,13 @@ from tests.batch.projects import PHOTOS, Alone, run, tree, write_projects
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
+
 RESULT = {
-    "batch.json", "parallaxes.csv", "photos.csv", "points.csv", "project.resolved.yaml", "refined.csv", "rejected.csv",
+    "batch.json", "photos.csv", "points.csv", "project.resolved.yaml", "refined.csv", "rejected.csv",
     "residuals.csv", "result.json",
 }  # fmt: skip
 SUMMARIES = {"summary.txt", "summary.csv", "summary.json", "junit.xml"}
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Give a folder with three good projects and stand in it; they are computed in this process, without waiting."""
-    write_projects(tmp_path / "strips", 3)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(pool, "LocalPool", Alone)
-    return tmp_path
 
 
 def spoil(project: Path) -> None:
@@ -43,7 +35,7 @@ def spoil(project: Path) -> None:
 
 
 @pytest.mark.slow
-def test_every_project_gets_the_result_that_run_gives(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_project_gets_the_result_that_run_gives(here: Path, capsys: Capture) -> None:
     assert main(["batch", "strips", "-o", "out", "-j", "2"]) == 0
     captured = capsys.readouterr()
     assert "3 projects: 3 good" in captured.out
@@ -58,7 +50,7 @@ def test_every_project_gets_the_result_that_run_gives(here: Path, capsys: pytest
 
 
 @pytest.mark.slow
-def test_strict_asks_more_of_the_same_results(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_strict_asks_more_of_the_same_results(here: Path, capsys: Capture) -> None:
     control = here / "strips" / "s2" / "control.csv"
     lines = control.read_text(encoding="utf-8").splitlines(keepends=True)
     control.write_text("".join(line for line in lines if ",check" not in line), encoding="utf-8")
@@ -73,7 +65,7 @@ def test_strict_asks_more_of_the_same_results(here: Path, capsys: pytest.Capture
 
 
 @pytest.mark.slow
-def test_a_failure_ends_no_other_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_failure_ends_no_other_project(here: Path, capsys: Capture) -> None:
     spoil(here / "strips" / "s2")
     assert main(["batch", "strips", "-o", "out", "-j", "1"]) == 2
     out = capsys.readouterr().out
@@ -87,7 +79,7 @@ def test_a_failure_ends_no_other_project(here: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.slow
-def test_the_summary_is_the_same_on_paper_and_on_the_terminal(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_summary_is_the_same_on_paper_and_on_the_terminal(here: Path, capsys: Capture) -> None:
     spoil(here / "strips" / "s2")
     for form, file in (
         ("json", "summary.json"),
@@ -99,7 +91,7 @@ def test_the_summary_is_the_same_on_paper_and_on_the_terminal(here: Path, capsys
         assert capsys.readouterr().out == (here / "out" / file).read_text(encoding="utf-8")
 
 
-def test_the_table_has_the_numbers_of_the_results(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_has_the_numbers_of_the_results(here: Path, capsys: Capture) -> None:
     assert main(["batch", "strips/s1", "-o", "out", "--format", "csv"]) == 0
     (row,) = csv.DictReader(StringIO(capsys.readouterr().out))
     result = read_result(str(here / "out" / "s1" / "result.json"))
@@ -110,7 +102,7 @@ def test_the_table_has_the_numbers_of_the_results(here: Path, capsys: pytest.Cap
 
 
 @pytest.mark.slow
-def test_a_tolerance_is_a_failure_and_a_fault_an_error(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_tolerance_is_a_failure_and_a_fault_an_error(here: Path, capsys: Capture) -> None:
     spoil(here / "strips" / "s3")
     assert main(["batch", "strips", "--set", "tolerances.sigma0_um=0.001", "--format", "junit"]) == 2
     suite = ET.fromstring(capsys.readouterr().out).find("testsuite")  # noqa: S314 (our own)
@@ -123,7 +115,7 @@ def test_a_tolerance_is_a_failure_and_a_fault_an_error(here: Path, capsys: pytes
 
 
 @pytest.mark.slow
-def test_annotations_name_file_and_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_annotations_name_file_and_line(here: Path, capsys: Capture) -> None:
     spoil(here / "strips" / "s2")
     assert main(["batch", "strips", "--format", "github", "--quiet"]) == 2
     (line,) = capsys.readouterr().out.splitlines()
@@ -150,7 +142,7 @@ def computed(text: str) -> set[str]:
 
 
 @pytest.mark.slow
-def test_only_what_changed_is_computed_again(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_only_what_changed_is_computed_again(here: Path, capsys: Capture) -> None:
     batch = ["batch", "strips", "-o", "out"]
     assert main(batch) == 0
     assert computed(capsys.readouterr().err) == {"s1", "s2", "s3"}
@@ -170,9 +162,7 @@ def test_only_what_changed_is_computed_again(here: Path, capsys: pytest.CaptureF
 
 @pytest.mark.slow
 @pytest.mark.parametrize("damage", ["cut", "edited", "removed", "record"])
-def test_a_result_that_is_not_as_it_was_written_is_computed_again(
-    here: Path, capsys: pytest.CaptureFixture[str], damage: str
-) -> None:
+def test_a_result_that_is_not_as_it_was_written_is_computed_again(here: Path, capsys: Capture, damage: str) -> None:
     batch = ["batch", "strips", "-o", "out"]
     assert main(batch) == 0
     before = tree(here / "out")
@@ -190,9 +180,7 @@ def test_a_result_that_is_not_as_it_was_written_is_computed_again(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("named", ["inputs", "outputs"])
-def test_a_record_that_names_a_device_is_not_trusted(
-    here: Path, capsys: pytest.CaptureFixture[str], named: str
-) -> None:
+def test_a_record_that_names_a_device_is_not_trusted(here: Path, capsys: Capture, named: str) -> None:
     """Most devices would be read without end."""
     batch = ["batch", "strips", "-o", "out"]
     assert main(batch) == 0
@@ -206,7 +194,7 @@ def test_a_record_that_names_a_device_is_not_trusted(
 
 
 @pytest.mark.slow
-def test_a_file_that_two_projects_share_changes_both(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_two_projects_share_changes_both(here: Path, capsys: Capture) -> None:
     shared = here / "preset.yaml"
     shared.write_text("processing: {relative: {grubbs_alpha: 0.05}}\n", encoding="utf-8")
     for name in ("s1", "s3"):
@@ -220,7 +208,7 @@ def test_a_file_that_two_projects_share_changes_both(here: Path, capsys: pytest.
 
 
 @pytest.mark.slow
-def test_a_grid_file_that_appears_changes_its_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_grid_file_that_appears_changes_its_project(here: Path, capsys: Capture) -> None:
     name = "made-up-grid.gsb"
     project = here / "strips" / "s1" / "project.yaml"
     text = project.read_text(encoding="utf-8")
@@ -247,7 +235,7 @@ def test_a_result_stays_when_its_project_fails_later(here: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_result_of_another_project_is_not_replaced(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_result_of_another_project_is_not_replaced(here: Path, capsys: Capture) -> None:
     write_projects(here / "others", 2)
     assert main(["batch", "strips/s1", "-o", "out", "--quiet"]) == 0
     before = tree(here / "out" / "s1")
@@ -262,7 +250,7 @@ def test_a_result_of_another_project_is_not_replaced(here: Path, capsys: pytest.
 
 
 @pytest.mark.slow
-def test_projects_may_move_together_with_their_results(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_projects_may_move_together_with_their_results(here: Path, capsys: Capture) -> None:
     assert main(["batch", "strips", "-o", "out"]) == 0
     (here / "archive").mkdir()
     for name in ("strips", "out"):
@@ -288,9 +276,7 @@ def test_projects_may_move_together_with_their_results(here: Path, capsys: pytes
         (["strips", "-o", "file.txt"], "is a file; expected a folder"),
     ],
 )
-def test_wrong_usage_is_told(
-    here: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
-) -> None:
+def test_wrong_usage_is_told(here: Path, capsys: Capture, arguments: list[str], message: str) -> None:
     (here / "empty").mkdir()
     (here / "file.txt").write_text("x", encoding="utf-8")
     assert main(["batch", *arguments]) == 2
@@ -308,7 +294,7 @@ def test_a_batch_that_nobody_computes_says_so(here: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.usefixtures("here")
-def test_wrong_usage_is_told_in_the_form_that_was_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_usage_is_told_in_the_form_that_was_asked_for(capsys: Capture) -> None:
     assert main(["batch", "nowhere/*", "--format", "json"]) == 2
     answer = json.loads(capsys.readouterr().out)
     assert (answer["exit_code"], answer["findings"][0]["code"]) == (2, "no-project")
@@ -327,7 +313,7 @@ def test_a_project_that_is_not_there_is_a_fault_among_others(here: Path) -> None
 
 
 @pytest.mark.slow
-def test_a_page_leads_to_the_reports(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_leads_to_the_reports(here: Path, capsys: Capture) -> None:
     asked = ["batch", "strips/s1", "-o", "results"]
     assert main([*asked, "--quiet"]) == 0
     assert not (here / "results/summary.html").exists()
