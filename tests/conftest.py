@@ -86,7 +86,7 @@ def _quick_start(forks: Forks, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def _adjusted_once(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """Let commands take over what the same data gave before, where a test looks at what is done with a result."""
-    from photostrip.pipeline import run  # not for tests without any
+    from photostrip.pipeline import run
     from tests.results import known
 
     triangulate = run.triangulate
@@ -103,7 +103,7 @@ def _adjusted_each_time(_adjusted_once: Callable[..., Result], monkeypatch: pyte
 @pytest.fixture
 def _no_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out what the data say against themselves, where many repetitions are adjusted for their numbers alone."""
-    monkeypatch.setattr("photostrip.pipeline.plausibility.gate.of_result", lambda *_: ())
+    monkeypatch.setattr("photostrip.pipeline.gate.of_result", lambda *_: ())
 
 
 class Backwards(pytest.Dir):  # type: ignore[misc]  # final for its names, which stay

@@ -34,7 +34,8 @@ ARGUMENT = re.compile(r"(?:[a-z_]\w*(?:, (?=[a-z_]))?)+: ")  # ``left, right: ..
 PARAGRAPH = re.compile(r"(Returns|Raises|Source:?) ?")
 WIDTH = 100  # of a signature on one line
 STEPS = ("interior", "refine", "relative", "chain", "intersection", "scale_transfer", "strip", "absolute", "polynomial",
-         "resection", "bundle")  # fmt: skip
+         "resection", "bundle", "frame", "curvature", "pair_scales", "closed_form", "deformation", "from_angles",
+         "angles")  # fmt: skip
 
 
 EXIT_CODES = (

@@ -149,8 +149,9 @@ class Result:
     pairs = _table("models", "Relative orientation of pairs, or the independent models: elements, parallaxes, scale.")
     strips = _table("strips", "The strips: counts, scale, sigma0, deformation.")
     control = _table("control", "Given points: adjusted minus given, standard deviations.")
-    residuals = _table("residuals", "Image residuals under the final orientations, a row for each ray.")
-    parallaxes = _table("parallaxes", "Residual y parallaxes, a row for each point of each pair.")
+    residuals = _table(
+        "residuals", "Image residuals under the final orientations, a row for each ray; y parallaxes of the pairs."
+    )
     rejected = _table("rejected", "Measurements that were taken out, with the test and the reason.")
     findings = _table("findings", "What the data say against themselves.")
     notes = _table("notes", "What the numbers need beside them to be read rightly.")

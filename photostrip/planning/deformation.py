@@ -34,7 +34,7 @@ from photostrip.planning.single_model import (
     orientation_parameters,
 )
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
-from photostrip.strip.relative_orientation import standard_points
+from photostrip.strip import relative_orientation
 
 DEFORMATION_TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5
@@ -118,18 +118,20 @@ def rigorous_covariance(xy: ArrayLike, focal: float, width: float, base: float, 
     """
     place = np.asarray(xy, float)
     level = np.column_stack([place, np.full(len(place), focal)])
-    rows = influence(level, base) @ standard_points.dependent_from_base(base)
+    rows = influence(level, base) @ relative_orientation.dependent_from_base(base)
     stretch = focal / base * np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
     rows[:, :2] -= place[:, :, None] * stretch
     units = np.moveaxis(np.array([parallax_error(place, unit, focal, base) for unit in np.eye(5)]), 0, -1)
     rows[:, 2] = -focal / base * units
-    cofactors = standard_points.cofactors(focal, width, base)
+    cofactors = relative_orientation.cofactors(focal, width, base)
     return 2 * sigma**2 * rows @ cofactors @ np.swapaxes(rows, 1, 2) + measured_covariance(level, base, focal, sigma)
 
 
 def base_frame_elements(dependent: ArrayLike, base: float) -> Floats:
     """Return alpha1', kappa1', alpha2', omega2', kappa2' for dby, dbz, dkappa, dalpha, domega of the right photo."""
-    return np.asarray(np.linalg.solve(standard_points.dependent_from_base(base), np.asarray(dependent, float)), float)
+    return np.asarray(
+        np.linalg.solve(relative_orientation.dependent_from_base(base), np.asarray(dependent, float)), float
+    )
 
 
 def surface_of_elements(elements: ArrayLike, scale: float, focal: float, base: float) -> Floats:

@@ -17,9 +17,14 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.rotation import from_angles
 from photostrip.strip.pair_screening import ScreenedPairs, screen_pairs
-from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-from photostrip.strip.relative_orientation.solution import linearised_parallaxes
+from photostrip.strip.relative_orientation import (
+    MINIMUM_POINTS,
+    Pairs,
+    RelativeSettings,
+    linearised_parallaxes,
+    orient_unchecked,
+    unusable_pairs,
+)
 
 ZONES = 6
 ARC_MINUTES = 60 * 180 / np.pi  # in a radian

@@ -12,6 +12,7 @@ import numpy as np
 from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.formats.text.findings import suggestion
+from photostrip.geodesy.local_frame import EARTH_RADIUS
 from photostrip.planning import camera_efficiency
 from photostrip.planning.ideal_strip import BUNDLE, LEAST_PHOTOS, METHODS, USES, ControlLayout, Spot, StripGeometry
 from photostrip.planning.ideal_strip import LAYOUTS as STRIP_LAYOUTS
@@ -19,7 +20,7 @@ from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, Mode
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
 from photostrip.project.conversion import distortion_of
-from photostrip.project.keys import Distortion
+from photostrip.project.keys import Distortion, Ellipsoid
 from photostrip.project.reading import Reading, read_keys, valid_section
 from photostrip.project.sections import (
     After,
@@ -49,12 +50,13 @@ from photostrip.project.simulation import SimulatedCamera, camera_of
 from photostrip.project.terrestrial import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
 from photostrip.project.terrestrial import Camera as Phototheodolite
 from photostrip.simulation import Points
-from photostrip.strip.polynomial_terms import POWERS
-from photostrip.strip.relative_orientation.orientation import SCREENINGS
+from photostrip.strip.polynomial import POWERS
+from photostrip.strip.relative_orientation import SCREENINGS
 from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
 OVERLAP = Range(1.0, 99.0, "%")
+STEP_ANGLES = ("omega-phi-kappa", "alpha-omega-kappa")
 
 Percent = Annotated[Positive, After(bounded(OVERLAP))]
 SigmaUm = Annotated[Positive, After(bounded(IMAGE_SIGMA_UM))]
@@ -813,6 +815,12 @@ class InteriorKeys(StepKeys):
     )
 
 
+class TurnedKeys(StepKeys):
+    """A step with rotations."""
+
+    angles: Annotated[Words, After(one_of(*STEP_ANGLES))] = key("System of the angles, given and found", STEP_ANGLES[0])
+
+
 class FocalKeys(StepKeys):
     """A step with photos of one camera."""
 
@@ -828,19 +836,19 @@ class RefineKeys(FocalKeys):
     ground_height: Number = key("Of the terrain, above sea level", 0.0, unit="m")
 
 
-class RelativeKeys(FocalKeys):
+class RelativeKeys(FocalKeys, TurnedKeys):
     """Two photos oriented relative to each other, and their model."""
 
     base: Positive = key("Length of the first base", 100.0, unit="unit")
     unit: Words = key("What model coordinates are in", "mm")
 
 
-class IntersectionKeys(FocalKeys):
+class IntersectionKeys(FocalKeys, TurnedKeys):
     """The rays of two photos of known orientation."""
 
     base: Triple = key("From the left to the right perspective centre", unit="unit")
-    left: Triple = key("Omega, phi, kappa of the left photo", (0.0, 0.0, 0.0), unit="deg")
-    right: Triple = key("Omega, phi, kappa of the right photo", (0.0, 0.0, 0.0), unit="deg")
+    left: Triple = key("Angles of the left photo", (0.0, 0.0, 0.0), unit="deg")
+    right: Triple = key("Angles of the right photo", (0.0, 0.0, 0.0), unit="deg")
     unit: Words = key("What coordinates are in", "m")
     left_ray: Flag = key("Y of the left ray, as printed, instead of the mean of both", False)  # noqa: FBT003
 
@@ -853,19 +861,21 @@ class StripKeys(RelativeKeys):
     )
 
 
-class AbsoluteKeys(StepKeys):
+class AbsoluteKeys(TurnedKeys):
     """A model fitted to known points."""
 
     unit: Words = key("What ground coordinates are in", "m")
 
 
-class PolynomialKeys(AbsoluteKeys):
+class PolynomialKeys(StepKeys):
     """The deformation of a strip along one axis."""
+
+    unit: Words = key("What ground coordinates are in", "m")
 
     terms: list[Annotated[Words, After(one_of(*POWERS))]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
 
 
-class ResectionKeys(FocalKeys):
+class ResectionKeys(FocalKeys, TurnedKeys):
     """One photo oriented on known points."""
 
     sigma_um: Positive = key("Standard deviation of an image coordinate", 5.0, unit="um")
@@ -878,3 +888,41 @@ class BundleKeys(ResectionKeys):
     base: Positive = key("Length of the first base, without control", 100.0, unit="unit")
     control: Words | None = key("Table of given points: point, x_ground, y_ground, z_ground", None)
     control_sigma: Positive = key("Standard deviation of a given coordinate", 0.05, unit="unit")
+
+
+class PairScalesKeys(StepKeys):
+    """Distances of points in two systems."""
+
+    unit: Words = key("What ground coordinates are in", "m")
+
+
+class FrameKeys(StepKeys):
+    """Geodetic coordinates taken into an intermediate frame at their middle."""
+
+    azimuth: Annotated[Number, After(bounded(Range(-360.0, 360.0, "deg")))] = key(
+        "Of the X axis, clockwise from north", 0.0, unit="deg"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid, its semi-axes; default: WGS 84", None)
+
+
+class CurvatureKeys(StepKeys):
+    """The Earth's curvature below plane coordinates, from their middle."""
+
+    radius: Positive = key("Of the Earth in the direction of the strip", EARTH_RADIUS, unit="m")
+
+
+class ClosedFormKeys(StepKeys):
+    """Errors of points of an oriented model per error of each element, in closed form."""
+
+    control: Words = key("Table of control, given in full: point, x, y from the left nadir, mm at photo scale")
+    base: Positive = key("Photo base", unit="mm")
+    principal_distance: Positive = key("Principal distance", unit="mm")
+    as_printed: Flag = key("With the misprints of the source", False)  # noqa: FBT003
+
+
+class DeformationKeys(StepKeys):
+    """The surface that twist and bending of a model make of its heights: x, y in mm at photo scale, dz in metres."""
+
+    sigma: Positive = key("Standard deviation of dz", 0.1, unit="m")
+    scale: Positive = key("Denominator of the photo scale")
+    base: Positive = key("Photo base", unit="mm")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tests.calls import Capture
 
 RESULT = {
-    "batch.json", "parallaxes.csv", "photos.csv", "points.csv", "project.resolved.yaml", "refined.csv", "rejected.csv",
+    "batch.json", "photos.csv", "points.csv", "project.resolved.yaml", "refined.csv", "rejected.csv",
     "residuals.csv", "result.json",
 }  # fmt: skip
 SUMMARIES = {"summary.txt", "summary.csv", "summary.json", "junit.xml"}

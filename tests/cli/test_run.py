@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
-TABLES = ("points", "photos", "given_points", "residuals", "parallaxes", "rejected", "refined")
+TABLES = ("points", "photos", "given_points", "residuals", "rejected", "refined")
 FILES = {*(f"{name}.csv" for name in TABLES), "project.resolved.yaml", "result.json"}
 
 

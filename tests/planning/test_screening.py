@@ -14,7 +14,7 @@ from photostrip.planning.screening import (
     spoiled,
     standard_pairs,
 )
-from photostrip.strip.relative_orientation.orientation import orient_unchecked
+from photostrip.strip.relative_orientation import orient_unchecked
 from tests.loops import nonempty
 
 

@@ -3,7 +3,7 @@
 Each is a row of ``READINGS``. Where a formed strip does not fit its control, it is laid on it under each of them, and
 what is written has a likelihood: that of the misclosures by their joint covariance, with a price for what is taken out.
 The likeliest is named, if the strip fits under it and chance does not make as much of so many. Where none fits,
-something may be common to all heights or to one list (``shared_by_control``).
+something may be common to all heights or to one list (``find_shared``).
 """
 
 from __future__ import annotations
@@ -20,19 +20,18 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import collinearity
 from photostrip.network.hypotheses import HEIGHTS_ONLY
 from photostrip.notes import Finding
+from photostrip.pipeline import evidence
+from photostrip.pipeline.evidence import HeldStrip, OnControl
+from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.inputs import Settings, Strip
-from photostrip.pipeline.plausibility import evidence
-from photostrip.pipeline.plausibility.on_control import HeldStrip, OnControl
-from photostrip.pipeline.plausibility.shared_errors import FIX, other_distance, shifted_list
-from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.pipeline.shared_errors import FIX, other_distance, shifted_list
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import Evidence
-from photostrip.plausibility.shared_by_control import ShiftedList, StretchedHeights, find_shared
-from photostrip.plausibility.slips import LIMIT
-from photostrip.plausibility.wrong_place import FOOT, KINDS_OF_FEET
+from photostrip.plausibility.given_points import LIMIT, ShiftedList, StretchedHeights, find_shared
+from photostrip.plausibility.units import FOOT, KINDS_OF_FEET
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
-from photostrip.strip.control_search import ROUNDING
+from photostrip.strip.control_screening import ROUNDING
 
 LEVEL = 1e-6  # of naming a reading where the control is read as it should be: a run fails because of it
 SEARCH_LEVEL = 0.01  # of taking anything out of sound control

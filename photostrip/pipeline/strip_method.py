@@ -1,9 +1,15 @@
-"""A strip of independent models: its models linked, its perspective centres moved with the ground below them."""
+"""A strip of independent models: its models linked, its perspective centres moved with the ground below them.
+
+All strips of a project: formed without any control, and corrected by polynomials for what the similarity leaves.
+
+Source: [001] eq. 150-152.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -14,18 +20,40 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.adjustment import BundleSolution, solve
-from photostrip.network.cofactors import joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
-from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
-from photostrip.pipeline.overruling import rows_of_models
+from photostrip.network.reliability import joint_cofactors
+from photostrip.pipeline import photos_on_control
+from photostrip.pipeline.formed_photos import FormedPhotos, form_strip
+from photostrip.pipeline.inputs import (
+    SIMILARITY,
+    Inputs,
+    ModelStrip,
+    Settings,
+    Strip,
+    require_measured,
+    require_named,
+    require_weighted,
+    rows_of_models,
+)
+from photostrip.pipeline.photos_on_control import (
+    OrientedStrip,
+    ScreenedPhotos,
+    control_of,
+    link_notes,
+    strip_at_control,
+    to_ground,
+)
 from photostrip.pipeline.results import ModelStages, StripResult
-from photostrip.pipeline.strips import notes
-from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, strip_at_control, to_ground
-from photostrip.pipeline.strips.notes import link_notes
-from photostrip.points import ControlPoints, ModelPoints, locate, take_rows
-from photostrip.strip import absolute_orientation, control_screening, model_links, model_strip
-from photostrip.strip.model_links import LinkSettings, ScreenedLinks, StripModels
-from photostrip.strip.model_strip import FormedModels, form_from_models, require_links
+from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, locate, take_rows
+from photostrip.strip import absolute_orientation, control_screening, linked_models, polynomial
+from photostrip.strip.linked_models import (
+    FormedModels,
+    LinkSettings,
+    ScreenedLinks,
+    StripModels,
+    form_from_models,
+    require_links,
+)
 from photostrip.strip.polynomial import Polynomial
 from photostrip.units import MILLIMETRES
 
@@ -85,7 +113,7 @@ class ScreenedModels(NamedTuple):
     screened_control: control_screening.ScreenedControl
 
 
-def on_control(
+def models_on_control(
     linked: LinkedModels,
     control: ControlPoints,
     frames: Sequence[GroundFrame],
@@ -93,19 +121,19 @@ def on_control(
 ) -> ScreenedModels:
     """Lay a strip on that of its control which nothing contradicts.
 
-    Raises as ``orient_on_control`` does.
+    Raises as ``orient_models_on_control`` does.
     """
-    models = orient_on_control(linked, control, frames, settings.absolute)
+    models = orient_models_on_control(linked, control, frames, settings.absolute)
     if settings.links.screening == "none":
         return ScreenedModels(models, control_screening.not_screened(models.oriented.control))
     oriented = models.oriented
     screened = control_screening.screen_control(strip_at_control(oriented, (), models.misclosure_covariance))
     if screened.rejections:
-        models = orient_on_control(linked, screened.kept, frames, settings.absolute)
+        models = orient_models_on_control(linked, screened.kept, frames, settings.absolute)
     return ScreenedModels(models, screened)
 
 
-def orient_on_control(
+def orient_models_on_control(
     linked: LinkedModels,
     control: ControlPoints,
     frames: Sequence[GroundFrame],
@@ -139,14 +167,14 @@ def _refuse_other_hand(oriented: OrientedStrip) -> None:
         return
     xyz = oriented.formed.xyz[oriented.control_rows]
     targets = oriented.targets.of(xyz)[full]
-    as_it_is, mirrored = model_links.either_hand(xyz[full], targets)
+    as_it_is, mirrored = linked_models.either_hand(xyz[full], targets)
     expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread.plan**2 + spread.height**2).sum()
-    conspicuous = as_it_is > model_links.CONSPICUOUS * expected
-    if conspicuous and mirrored < model_links.REFLECTED * as_it_is:
+    conspicuous = as_it_is > linked_models.CONSPICUOUS * expected
+    if conspicuous and mirrored < linked_models.REFLECTED * as_it_is:
         raise _left_handed(oriented.strip)
 
 
-def adjusted(screened: ScreenedModels, correction: Polynomial | None) -> StripResult:
+def adjusted_models(screened: ScreenedModels, correction: Polynomial | None) -> StripResult:
     """Adjust the points, and move the perspective centres with the ground below them."""
     linked, oriented = screened.models
     strip, formed = linked.strip, linked.formed
@@ -166,9 +194,9 @@ def adjusted(screened: ScreenedModels, correction: Polynomial | None) -> StripRe
         depth=depth_of(centers, xyz),
         notes=(
             *link_notes(strip, linked.measured, formed),
-            *notes.wrong_control_notes(strip, screened.screened_control),
-            *notes.control_notes(strip, oriented.absolute),
-            *notes.polynomial_notes(strip, correction, xyz),
+            *photos_on_control.wrong_control_notes(strip, screened.screened_control),
+            *photos_on_control.control_notes(strip, oriented.absolute),
+            *photos_on_control.polynomial_notes(strip, correction, xyz),
         ),
         screened_control=screened.screened_control,
         model_stages=ModelStages(
@@ -210,7 +238,7 @@ def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> 
             point_ids=tuple(map(measured.name, range(len(nodes)))),
         )
     )
-    adjusted = model_links.Similarities(network.scales, network.rotations, network.centers)
+    adjusted = linked_models.Similarities(network.scales, network.rotations, network.centers)
     formed = replace(
         formed,
         places=adjusted,
@@ -227,14 +255,14 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
     Raises GeometryError, InputError when a link cannot be determined, or models are mirror images of each other.
     """
     models = models_of(strip, measured, settings.links)
-    shared = model_links.common(models)
+    shared = linked_models.common(models)
     try:
         require_links(shared, models, np.ones(len(shared.link), bool), strip.models)
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, code=error.code) from error
     kept = rows_of_models(settings.links.keep, measured)[models.row]
-    links = model_links.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
+    links = linked_models.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
     _refuse_reflected(strip, links)
     photos = locate(strip.photos, measured.photo_ids)
     return form_from_models(models, links, np.where(photos < 0, -1, photos + len(measured.point_ids)))
@@ -245,7 +273,7 @@ def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) 
     place = locate(measured.model_ids, strip.models)[measured.model]
     rows = np.flatnonzero(place >= 0)
     rows = rows[np.lexsort((measured.node[rows], place[rows]))]
-    whole = model_links.StripModels(
+    whole = linked_models.StripModels(
         count=len(strip.models),
         points=len(measured.point_ids),
         row=rows,
@@ -299,7 +327,84 @@ def _centers(formed: FormedModels, similarity: Similarity, correction: Polynomia
     if correction is None or not known.any():
         return placed
     found, axes = placed[known], correction.axes
-    above = model_strip.heights_above(found, similarity(formed.xyz))
-    rows = model_strip.displacement_rows(found, above, [axis.terms for axis in axes])
+    above = linked_models.heights_above(found, similarity(formed.xyz))
+    rows = linked_models.displacement_rows(found, above, [axis.terms for axis in axes])
     placed[known] = found + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
     return placed
+
+
+def form_strips(
+    inputs: Inputs, observations: PhotoPoints, settings: Settings
+) -> list[FormedPhotos] | list[LinkedModels]:
+    """Form the strips of a project, of photos or of independent models, each by itself."""
+    models = inputs.models
+    if models is None:
+        return form_photos(inputs, observations, settings)
+    require_named(settings.links, models.points)
+    return [link_strip(strip, models.points, settings) for strip in models.strips]
+
+
+def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[FormedPhotos]:
+    """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
+    require_measured(settings.relative, observations)
+    require_weighted(settings.formation, observations)
+    whole = [strip for strip in inputs.strips if len(strip.photos) > 1]
+    if len(whole) < len(inputs.strips) and not settings.together:
+        alone = next(strip.photos for strip in inputs.strips if len(strip.photos) == 1)
+        msg = f"photo {alone[0]} is no strip: only a bundle adjustment can orient it"
+        raise GeometryError(msg, photos=alone, code="one-photo")
+    return [form_strip(strip, observations, settings) for strip in whole]
+
+
+def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError) -> Inputs | None:
+    """Cut the strip that a refusal is about into single photos, to start from given orientations or on others' points.
+
+    A bundle that diverges names none: then all strips are cut.
+
+    None where orientations are not given for all photos and no strip is left beside them, the bundle rejects nothing,
+    or positions of a strip share an error.
+    """
+    positions, named = inputs.positions, set(refused.photos)
+    known = set() if inputs.orientations is None else set(inputs.orientations.photos)
+    several = [strip for strip in inputs.strips if len(strip.photos) > 1 and named <= set(strip.photos)]
+    if not several or not (named or refused.code == "bundle-diverged"):
+        return None
+    left = any(len(strip.photos) > 1 and strip not in several for strip in inputs.strips)
+    if not left and not all(known.issuperset(strip.photos) for strip in several):
+        return None
+    if not settings.together or "none" in {settings.bundle.screening, settings.relative.screening}:
+        return None
+    if positions is not None and positions.correction != "none" and positions.group == "strip":
+        return None
+
+    def cut(strip: Strip) -> list[Strip]:
+        names = [f"{strip.id}/{photo}" if strip.listed else photo for photo in strip.photos]
+        singles = [replace(strip, id=name, photos=(photo,)) for name, photo in zip(names, strip.photos, strict=True)]
+        return singles if strip in several else [strip]
+
+    return replace(inputs, strips=tuple(chain(*map(cut, inputs.strips))))
+
+
+def adjust_photos(screened: ScreenedPhotos, settings: Settings) -> StripResult:
+    """Correct the deformation of a strip and orient its photos on the corrected points."""
+    return photos_on_control.adjusted(screened, _correction(screened.photos.oriented, settings), settings)
+
+
+def adjust_formed(
+    stage: FormedPhotos | LinkedModels, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> StripResult:
+    """Lay a formed strip on its control and correct its deformation."""
+    if isinstance(stage, FormedPhotos):
+        return adjust_photos(photos_on_control.on_control(stage, control, frames, settings), settings)
+    found = models_on_control(stage, control, frames, settings)
+    return adjusted_models(found, _correction(found.models.oriented, settings))
+
+
+def _correction(oriented: OrientedStrip, settings: Settings) -> polynomial.Polynomial | None:
+    if settings.adjustment == SIMILARITY:
+        return None
+    spacing, breadth = oriented.extent
+    problem = polynomial.FitProblem(
+        xyz=oriented.at_control, targets=oriented.targets, weight=oriented.weights, spacing=spacing, breadth=breadth
+    )
+    return polynomial.fit(problem, settings.polynomial)

@@ -6,7 +6,6 @@ What a bundle adjustment took up as common to all camera positions, or to all ph
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,19 +38,16 @@ from photostrip.network.observations import drift_columns
 from photostrip.network.problem import CALIBRATION
 from photostrip.network.reliability import CONTROL, Parameter
 from photostrip.notes import Finding, listed
+from photostrip.pipeline.evidence import OnControl
+from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.inputs import Inputs, Strip
-from photostrip.pipeline.plausibility.on_control import OnControl
 from photostrip.pipeline.results import Bundle, Result
-from photostrip.pipeline.strips.models import LinkedModels
-from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.pipeline.strip_method import LinkedModels
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import CAUSES, Evidence
-from photostrip.plausibility.shared_by_control import Shared, ShiftedList, StretchedHeights, find_shared, significant
+from photostrip.plausibility.given_points import Shared, ShiftedList, StretchedHeights, find_shared, significant
 from photostrip.points import ControlPoints
-
-if TYPE_CHECKING:
-    from photostrip.strip.fitted_strip import CheckErrors
-
+from photostrip.strip.fitted_strip import CheckErrors
 
 Common = StretchedHeights | ShiftedList
 FIX = "take it from the certificate"

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,24 +16,23 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
+from photostrip.network.hypotheses import DRIFT, OFFSET, ORDER
+from photostrip.network.reliability import POSITION, image_shift
 from photostrip.notes import Finding
-from photostrip.pipeline.frames import GroundFrames
-from photostrip.pipeline.image_coordinates import PhotoCoordinates
+from photostrip.pipeline import evidence, given_on_ground, shared_errors
+from photostrip.pipeline.control_readings import find_distance
+from photostrip.pipeline.evidence import of_images, of_units
+from photostrip.pipeline.formed_photos import FormedPhotos
+from photostrip.pipeline.frames import GroundFrames, PhotoCoordinates
+from photostrip.pipeline.given_on_ground import GivenControl, Predicted
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
-from photostrip.pipeline.plausibility import control_layout, evidence, given_cameras, given_control
-from photostrip.pipeline.plausibility.control_readings import find_distance
-from photostrip.pipeline.plausibility.evidence import of_images, of_units
-from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.plausibility import accepted, flight, flight_order, ids, units
+from photostrip.pipeline.precision import compared_strips
+from photostrip.pipeline.results import Bundle, Result, StripResult
+from photostrip.pipeline.strip_method import LinkedModels
+from photostrip.plausibility import accepted, flight, ids, units
 from photostrip.plausibility.ids import OrientedRays
 from photostrip.points import PhotoPoints
 from photostrip.strip.resection import KnownPhotos
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.plausibility.given_control import Predicted
-    from photostrip.pipeline.results import Bundle, Result, StripResult
-    from photostrip.pipeline.strips.models import LinkedModels
 
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
@@ -110,15 +108,15 @@ def _of_data(
     ]
     whole = [each for each in formed if each is not None]
     findings = [*images.findings, *_of_control(control, points, whole, settings, slips=True)]
-    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
+    findings += given_on_ground.weak_layout(inputs, settings, images, control, directory)
     moved = {name for each in images.findings if each.code == OUT_OF_ORDER for name in each.strips}
     for each in whole:
         findings += [*_of_formed(each, points), *_shared_ids(each, points)]
         findings += () if each.strip.id in moved else _of_flight(each)
-    findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=starts)
-    findings += given_cameras.angles(inputs, whole, points, directory)
+    findings += given_on_ground.centers(inputs, images.observations, images.strips, directory, starts=starts)
+    findings += given_on_ground.angles(inputs, whole, points, directory)
     for strip in [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]:
-        findings += flight_order.find_other_scale(images.observations, strip.id, strip.photos)
+        findings += flight.find_other_scale(images.observations, strip.id, strip.photos)
         if control is not None and not any(each.code in OF_DISTANCE for each in findings):
             findings += find_distance(strip, points, control.points, control.read_in, settings)
     return _told(findings, inputs, settings)
@@ -126,12 +124,9 @@ def _of_data(
 
 def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment being done."""
-    from photostrip.pipeline.plausibility import given_control as by_result
-    from photostrip.pipeline.plausibility import shared_errors
-
     inputs, settings = result.inputs, result.settings
     control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
-    predicted = by_result.Predicted(result)
+    predicted = Predicted(result)
     if inputs.models is not None:
         return _of_adjusted_models(result, inputs.models, control, predicted)
     points = result.refined.observations
@@ -142,16 +137,18 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     images = replace(images, observations=points)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [evidence.as_formed(each.of_photos, as_given) for each in stages]
-    causes = [] if result.bundle is None else _causes(result.bundle, inputs)
+    causes = [] if result.bundle is None else list(shared_errors.of_bundle(result.bundle, inputs))
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
-    odd = {each.strip.id for each in formed if by_result.is_doubtful(each, result, predicted)}
+    odd = {each.strip.id for each in formed if given_on_ground.is_doubtful(each, result, predicted)}
     doubtful = [each for each in formed if misread or each.strip.id in odd]
     findings = [*images.findings]
     findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None)
     if control is not None and not any(each.is_error for each in findings):
         named = {name for each in (*findings, *causes) for name in each.points}
-        findings += [each for each in by_result.of_result(result, predicted, control) if named.isdisjoint(each.points)]
-    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
+        findings += [
+            each for each in given_on_ground.of_result(result, predicted, control) if named.isdisjoint(each.points)
+        ]
+    findings += given_on_ground.weak_layout(inputs, settings, images, control, directory)
     for each, strip in zip(formed, result.photo_strips, strict=True):
         findings += _of_formed(each, points)
         findings += _of_flight(each) if result.bundle is None else _of_adjusted_flight(strip)
@@ -160,7 +157,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
         findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
-    given = given_cameras.centers(inputs, points, images.strips, directory)
+    given = given_on_ground.centers(inputs, points, images.strips, directory)
     findings += [each for each in given if result.bundle is None or _contradicted(each, result.bundle)]
     findings += _of_rotations(result, formed, directory)
     if any(each.code in OF_LISTS for each in causes):  # all of the block says it best
@@ -176,12 +173,6 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
 def _is_explained(key: str, keys: Sequence[str]) -> bool:
     """Whether causes that were found speak of a key, or of a part of it: an offset, of the heights of positions."""
     return bool(key) and any(each == key or each.startswith(f"{key}.") for each in keys)
-
-
-def _causes(bundle: Bundle, inputs: Inputs) -> list[Finding]:
-    from photostrip.pipeline.plausibility import shared_errors
-
-    return list(shared_errors.of_bundle(bundle, inputs))
 
 
 def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
@@ -226,7 +217,7 @@ def _of_control(
     if control is None:
         return []
     copied = list(ids.find_copied_points(control.points, observations))
-    of_strips = [given_control.of_strip(control, each, settings) for each in formed]
+    of_strips = [given_on_ground.of_strip(control, each, settings) for each in formed]
     findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
     single = (finding for each in of_strips for finding in each.slips) if slips else ()
@@ -239,9 +230,7 @@ def _of_unadjusted_models(
     """Look at strips of models of which there is no result."""
     if control is None:
         return ()
-    from photostrip.pipeline.plausibility import control_layout
-
-    formed = list(control_layout.form_strips(models, settings))
+    formed = list(given_on_ground.form_strips(models, settings))
     return accepted(_of_models(formed, models, control, settings, slips=True), settings.accept)
 
 
@@ -249,16 +238,13 @@ def _of_adjusted_models(
     result: Result, models: MeasuredModels, control: GivenControl | None, predicted: Predicted
 ) -> tuple[Finding, ...]:
     """Look at strips of models as they were adjusted."""
-    from photostrip.pipeline.plausibility import control_layout, shared_errors
-    from photostrip.pipeline.plausibility import given_control as by_result
-
     if control is None:
         return ()
     settings = result.settings
-    formed = list(control_layout.form_strips(models, settings))
+    formed = list(given_on_ground.form_strips(models, settings))
     findings = _of_models(formed, models, control, settings, slips=result.precision is None)
     if not any(each.is_error for each in findings):
-        findings += by_result.of_result(result, predicted, control)
+        findings += given_on_ground.of_result(result, predicted, control)
         findings += shared_errors.find_shifted_checks(result)
     return accepted(findings, settings.accept)
 
@@ -267,15 +253,13 @@ def _of_models(
     formed: Sequence[LinkedModels], models: MeasuredModels, control: GivenControl, settings: Settings, *, slips: bool
 ) -> list[Finding]:
     """Look at strips of models: given points by themselves and in each strip, perspective centres."""
-    from photostrip.pipeline.plausibility import control_layout
-
     findings = [*control.findings]
     for each in formed:
-        of_strip = given_control.of_strip(control, each, settings)
+        of_strip = given_on_ground.of_strip(control, each, settings)
         findings += [*of_strip.whole, *(of_strip.slips if slips else ())]
-    for held in control_layout.model_strips(formed, models.points.point_ids, control.points):
-        findings += flight.find_odd_centers(held.centers, held.depth, control_layout.UP, held.photos, held.strip.id)
-        findings += control_layout.weak_layout_of_models(held, control)
+    for held in given_on_ground.model_strips(formed, models.points.point_ids, control.points):
+        findings += flight.find_odd_centers(held.centers, held.depth, given_on_ground.UP, held.photos, held.strip.id)
+        findings += given_on_ground.weak_layout_of_models(held, control)
     return findings
 
 
@@ -312,8 +296,6 @@ def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterab
         rays, photos = _rays_of(result.bundle, points), result.bundle.block.problem.photo_ids
         yield from ids.find_shared_ids(rays, points.point_ids, photos)
         return
-    from photostrip.pipeline.common_points import compared_strips
-
     for each in formed:
         yield from _shared_ids(each, points)
     for ties in compared_strips(tuple(stages), points.point_ids):
@@ -330,8 +312,6 @@ def _shared_ids(each: FormedPhotos, observations: PhotoPoints) -> Iterator[Findi
 
 def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:
     """Rays of a bundle; those that it rejected did not go with the others."""
-    from photostrip.network.reliability import image_shift
-
     solution = bundle.screened.solution
     problem = replace(bundle.block.problem, cameras=bundle.screened.problem.cameras)  # with what was taken up
     focal = problem.cameras.focal[problem.cameras.of_photo]
@@ -348,9 +328,6 @@ def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:
 
 def _contradicted(finding: Finding, bundle: Bundle) -> bool:
     """Whether a bundle did not go with all given positions of the photos of a finding, or took up what they share."""
-    from photostrip.network.hypotheses import DRIFT, OFFSET, ORDER  # a strip needs nothing of a bundle
-    from photostrip.network.reliability import POSITION
-
     screened, problem = bundle.screened, bundle.block.problem
     rows = [
         each.row for each in (*screened.rejections, *screened.held) if each.kind == POSITION and not each.readmitted
@@ -365,7 +342,7 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     if given is None:
         return []
     if result.bundle is not None:
-        findings = given_cameras.angles(result.inputs, formed, result.refined.observations, directory)
+        findings = given_on_ground.angles(result.inputs, formed, result.refined.observations, directory)
         if findings or given.observed:
             return findings
     target = result.inputs.output or next(iter(result.inputs.frames), given.frame)
@@ -382,4 +359,4 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     if not photos:
         return []
     of_photos, north = np.array([found[name] for name in photos]), float(np.median(np.concatenate(norths)))
-    return given_cameras.wrong_angles(given, photos, of_photos, north)
+    return given_on_ground.wrong_angles(given, photos, of_photos, north)
