@@ -24,7 +24,6 @@ from photostrip.project.reading import Reading, read_keys, valid_section
 from photostrip.project.sections import (
     After,
     Before,
-    FirstSchema,
     Flag,
     Fraction,
     Id,
@@ -33,15 +32,14 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    SchemaNumber,
     Section,
     Triple,
     Whole,
     Words,
-    bounded,
     choice,
     key,
     length,
-    one_of,
     rule,
     wrong,
 )
@@ -56,8 +54,8 @@ from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
 OVERLAP = Range(1.0, 99.0, "%")
 
-Percent = Annotated[Positive, After(bounded(OVERLAP))]
-SigmaUm = Annotated[Positive, After(bounded(IMAGE_SIGMA_UM))]
+Percent = Annotated[Positive, OVERLAP]
+SigmaUm = Annotated[Positive, IMAGE_SIGMA_UM]
 
 
 def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -112,7 +110,7 @@ class ModelControlPoint(ModelPoint):
     """One control point."""
 
     name: Id = key("Name; default: C and its number", "")
-    use: Annotated[Words, After(one_of(*POINT_USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    use: Annotated[str, choice(*POINT_USES)] = key("`xyz`, `xy` or `z`", "xyz")
     misclosure: Triple | None = key("Model minus given, where it has been measured", None, unit="m")
     given_error: Triple = key("Error of the given coordinates", NO_ERROR, unit="m")
 
@@ -135,9 +133,7 @@ def _control_point(value: object) -> object:
 class ModelControl(Section):
     """The control of the model."""
 
-    layout: Annotated[Words, After(one_of(*LAYOUTS))] = key(
-        "`corners`, `corners+centre`, or `six` standard points", "corners"
-    )
+    layout: Annotated[str, choice(*LAYOUTS)] = key("`corners`, `corners+centre`, or `six` standard points", "corners")
     points: list[Annotated[ModelControlPoint, Before(_control_point)]] = key(
         "Points instead of a layout: [x, y], or {at: [x, y], use: z}", []
     )
@@ -147,15 +143,15 @@ class ModelControl(Section):
 class ModelOrientation(Section):
     """The points that orient the pair."""
 
-    zone_points: Annotated[Whole, After(bounded(ZONE_POINTS))] = key("Points in each of six zones", 1)
+    zone_points: Annotated[Whole, ZONE_POINTS] = key("Points in each of six zones", 1)
     points: list[Pair] = key("Points instead of zones: [x, y], from the left nadir", [], unit="mm")
 
 
 class Grid(Section):
     """Where errors are computed."""
 
-    columns: Annotated[Whole, After(bounded(GRID_POINTS))] = key("Points along the base", ModelSpec.grid[0])
-    rows: Annotated[Whole, After(bounded(GRID_POINTS))] = key("Points across the flight", ModelSpec.grid[1])
+    columns: Annotated[Whole, GRID_POINTS] = key("Points along the base", ModelSpec.grid[0])
+    rows: Annotated[Whole, GRID_POINTS] = key("Points across the flight", ModelSpec.grid[1])
 
 
 def _listed(value: object) -> object:
@@ -172,12 +168,10 @@ def _listed(value: object) -> object:
 class ModelPlanFile(Flown):
     """Expected errors over one model. Every key but the first has a default."""
 
-    photostrip_plan_model: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_model: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "model")
     base: Positive | None = key("Photo base, instead of the overlap", None, unit="mm")
-    reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
-        "Outermost points, of half the width of the photo", 80.0, unit="%"
-    )
+    reach_percent: Annotated[Positive, REACH] = key("Outermost points, of half the width of the photo", 80.0, unit="%")
     orientation: ModelOrientation = key("Points that orient the pair", ModelOrientation())
     control: ModelControl = key("Control", ModelControl())
     grid: Grid = key("Where errors are computed", Grid())
@@ -185,7 +179,7 @@ class ModelPlanFile(Flown):
     element_errors: Annotated[ElementErrors, Before(_listed)] = key(
         "Given errors of the elements: by name, or [dby, dbz, dkappa, dalpha, domega]", ElementErrors()
     )
-    closed_form: Annotated[Words, After(one_of("no", "yes", "printed"))] = key(
+    closed_form: Annotated[str, choice("no", "yes", "printed")] = key(
         "Operators and closed form side by side, with c1 to c15; `printed`: as the source prints it, misprints and all",
         "no",
     )
@@ -286,20 +280,18 @@ DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corne
 class StripPoints(Section):
     """Pass points."""
 
-    rows: Annotated[Whole, After(bounded(ROWS))] = key("Points across the flight at each nadir", USUAL_POINTS.rows)
-    reach_percent: Annotated[Positive, After(bounded(ROW_REACH))] = key(
+    rows: Annotated[Whole, ROWS] = key("Points across the flight at each nadir", USUAL_POINTS.rows)
+    reach_percent: Annotated[Positive, ROW_REACH] = key(
         "Outermost rows, of half the width of the photo", USUAL_POINTS.reach_percent, unit="%"
     )
-    extra_per_model: Annotated[Whole, After(bounded(EXTRA))] = key(
-        "Further points in each model", USUAL_POINTS.extra_per_model
-    )
+    extra_per_model: Annotated[Whole, EXTRA] = key("Further points in each model", USUAL_POINTS.extra_per_model)
 
 
 class StripSpot(Section):
     """One control point."""
 
     at: tuple[Whole, Whole] = key("Photo at whose nadir it lies, and row from left to right, both counted from 1")
-    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    use: Annotated[str, choice(*USES)] = key("`xyz`, `xy` or `z`", "xyz")
 
 
 def _spot(value: object) -> object:
@@ -337,15 +329,13 @@ def _required(value: object) -> object:
 class StripLayout(Section):
     """One layout of control."""
 
-    layout: Annotated[Words, After(one_of(*STRIP_LAYOUTS))] = key(
+    layout: Annotated[str, choice(*STRIP_LAYOUTS)] = key(
         "`bands`, `corners`, `corners+centre`, or `points` alone", USUAL_LAYOUT.kind
     )
     bands: Whole = key("Bands across the strip, from the first to the last photo", USUAL_LAYOUT.bands)
-    every: Annotated[Whole, After(bounded(Range(1, 400, "models")))] | None = key(
-        "Models from band to band, instead of `bands`", None
-    )
+    every: Annotated[Whole, Range(1, 400, "models")] | None = key("Models from band to band, instead of `bands`", None)
     per_band: Whole = key("Points of a band", USUAL_LAYOUT.per_band)
-    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
+    use: Annotated[str, choice(*USES)] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
     points: list[Annotated[StripSpot, Before(_spot)]] = key(
         "Single points, further ones or instead of a band's: [photo, row], or {at: [photo, row], use: z}", []
     )
@@ -371,18 +361,18 @@ class StripRequired(Section):
 class StripPlacement(Section):
     """Further control points to be placed as well as possible."""
 
-    points: Annotated[Whole, After(bounded(PLACED))] = key("How many")
+    points: Annotated[Whole, PLACED] = key("How many")
     into: Id | None = key("Layout that they are added to; default: the first", None)
-    method: Annotated[Words, After(one_of(*METHODS))] = key("Method of adjustment", METHODS[-1])
-    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    method: Annotated[str, choice(*METHODS)] = key("Method of adjustment", METHODS[-1])
+    use: Annotated[str, choice(*USES)] = key("`xyz`, `xy` or `z`", "xyz")
 
 
 class StripPlanFile(Flown):
     """A strip and layouts of its control. Every key but the first has a default."""
 
-    photostrip_plan_strip: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_strip: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "strip")
-    models: Annotated[Whole, After(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
+    models: Annotated[Whole, MODELS] = key("Models of the strip, one less than photos", 10)
     points: StripPoints = key("Pass points", StripPoints())
     control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
     gnss: Sigmas | None = key(
@@ -395,7 +385,7 @@ class StripPlanFile(Flown):
         f" Default: {', '.join(DEFAULT_LAYOUTS)}",
         None,
     )
-    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(*METHODS)]], length(1)] = key(
         f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
     )
     required: Annotated[StripRequired, Before(_required)] = key(
@@ -482,9 +472,9 @@ def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float])
     )
 
 
-Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
-Relief = Annotated[Number, After(bounded(Range(0.0, 9000.0, "m")))]
-Slope = Annotated[Number, After(bounded(Range(0.0, 89.0, "deg")))]
+Lap = Annotated[Number, Range(0.0, 90.0, "%")]
+Relief = Annotated[Number, Range(0.0, 9000.0, "m")]
+Slope = Annotated[Number, Range(0.0, 89.0, "deg")]
 FLIGHTS = ("scale", "flying_height", "height_sigma")
 
 
@@ -527,7 +517,7 @@ class PlanCamera(Section):
 class CameraPlanFile(Section):
     """Cameras to compare."""
 
-    photostrip_plan_cameras: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_cameras: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the comparison", "cameras")
     end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
@@ -638,35 +628,31 @@ def _sigma(name: str, given: PlanCamera, base: float, width: float) -> float:
 PRESET = "UMK 10/1318"
 CONVERGENCE = Range(-45.0, 45.0, "deg")
 POWER = Range(0.5, 0.9999, "")
-Metres = Annotated[Number, After(bounded(DISTANCE))]
+Metres = Annotated[Number, DISTANCE]
 
 
 class DisplacementPlanFile(Section):
     """Expected accuracy of displacements. Every key but the first has a default."""
 
-    photostrip_plan_displacement: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_displacement: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "displacements")
     camera: CameraOrName = key(
         "Camera: its name in a list, or preset, principal_distance, format", Phototheodolite(preset=PRESET)
     )
     presets: Words | None = key("A list of cameras of your own", None)
-    stations: Annotated[Words, After(one_of("2", "1"))] = key(
-        "2, at the ends of a base, or 1, with known distances", "2"
-    )
-    base: Annotated[Number, After(bounded(BASE))] = key("Length of the base", 20.0, unit="m")
-    convergence_deg: Annotated[Number, After(bounded(CONVERGENCE))] = key(
-        "Turn of each camera towards the other", 0.0, unit="deg"
-    )
+    stations: Annotated[str, choice("2", "1")] = key("2, at the ends of a base, or 1, with known distances", "2")
+    base: Annotated[Number, BASE] = key("Length of the base", 20.0, unit="m")
+    convergence_deg: Annotated[Number, CONVERGENCE] = key("Turn of each camera towards the other", 0.0, unit="deg")
     distances: Annotated[list[Metres], length(1, 50)] = key(
         "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
     )
     sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
     sigma_d_um: SigmaUm | None = key("That of a pseudo-parallax, instead; default: 5", None, unit="um")
-    significance: Annotated[Fraction, After(bounded(SIGNIFICANCE))] = key(
+    significance: Annotated[Fraction, SIGNIFICANCE] = key(
         "Probability of calling a point moved that did not move", DisplacementSpec.significance
     )
-    power: Annotated[Fraction, After(bounded(POWER))] = key(
+    power: Annotated[Fraction, POWER] = key(
         "Probability with which the displacements stated are found", DisplacementSpec.power
     )
 
@@ -710,17 +696,17 @@ TILT, PAIR_RELIEF = Range(0.0, 10.0, "deg"), Range(0.0, 50.0, "%")
 POINTS, PAIRS = Range(0, 100, ""), Range(1, 1000, "")
 REPETITIONS = Range(1, 1000, "")
 
-Size = Annotated[Number, After(bounded(LENGTH))]
-Count = Annotated[Whole, After(bounded(POINTS))]
+Size = Annotated[Number, LENGTH]
+Count = Annotated[Whole, POINTS]
 
 
 class ScreeningPlanFile(Section):
     """An experiment with gross errors in pairs; the defaults are the published one."""
 
-    photostrip_plan_screening: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_screening: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "screening")
-    principal_distance: Annotated[Number, After(bounded(PAIR_FOCAL))] = key(
+    principal_distance: Annotated[Number, PAIR_FOCAL] = key(
         "Principal distance", USUAL_SCREENING.layout.focal, unit="mm"
     )
     base: Size = key("Photo base", USUAL_SCREENING.layout.base, unit="mm")
@@ -733,15 +719,15 @@ class ScreeningPlanFile(Section):
         USUAL_SCREENING.layout.scatter,
         unit="mm",
     )
-    tilt: Annotated[Number, After(bounded(TILT))] = key("Largest tilt", USUAL_SCREENING.layout.tilt, unit="deg")
-    relief_percent: Annotated[Number, After(bounded(PAIR_RELIEF))] = key(
+    tilt: Annotated[Number, TILT] = key("Largest tilt", USUAL_SCREENING.layout.tilt, unit="deg")
+    relief_percent: Annotated[Number, PAIR_RELIEF] = key(
         "Largest relief, up and down, of the flying height", 100 * USUAL_SCREENING.layout.relief, unit="%"
     )
     parallax_sigma_um: SigmaUm = key(
         "Standard deviation of a y parallax", MICROMETRES * USUAL_SCREENING.layout.parallax_sigma, unit="um"
     )
-    models: Annotated[Whole, After(bounded(PAIRS))] = key("Pairs, each with an error", USUAL_SCREENING.models)
-    second_errors: Annotated[Whole, After(bounded(Range(0, 1000, "")))] = key(
+    models: Annotated[Whole, PAIRS] = key("Pairs, each with an error", USUAL_SCREENING.models)
+    second_errors: Annotated[Whole, Range(0, 1000, "")] = key(
         "Pairs of them that have a second one", USUAL_SCREENING.second
     )
     error_sizes_um: Annotated[list[Positive], length(1, 20)] = key(
@@ -749,14 +735,12 @@ class ScreeningPlanFile(Section):
         [MICROMETRES * size for size in USUAL_SCREENING.sizes],
         unit="um",
     )
-    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(*SCREENINGS)]], length(1)] = key(
         "Methods, of `processing.relative.screening`", list(USUAL_SCREENING.methods)
     )
     grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL_SCREENING.grubbs_alpha)
     parallax_limit: Positive = key("Limit of `parallax+grubbs`", USUAL_SCREENING.parallax_limit, unit="mm")
-    repetitions: Annotated[Whole, After(bounded(REPETITIONS))] = key(
-        "How often the experiment is made", USUAL_SCREENING.repetitions
-    )
+    repetitions: Annotated[Whole, REPETITIONS] = key("How often the experiment is made", USUAL_SCREENING.repetitions)
     seed: Whole = key("Number that makes the drawn pairs and errors the same again", USUAL_SCREENING.seed)
 
     @rule
@@ -802,13 +786,13 @@ def load_screening_plan(path: Path | None, assignments: Sequence[str]) -> Screen
 class StepKeys(Section):
     """A step that needs nothing but its table."""
 
-    photostrip_step: FirstSchema = key("Number of this schema: 1")
+    photostrip_step: SchemaNumber = key("Number of this schema: 1")
 
 
 class InteriorKeys(StepKeys):
     """The transformation of measured fiducial marks to calibrated ones, mm."""
 
-    transform: Annotated[Words, After(one_of("conformal", "affine", "bilinear", "projective"))] = key(
+    transform: Annotated[str, choice("conformal", "affine", "bilinear", "projective")] = key(
         "From measured to photo coordinates: conformal, affine, bilinear, projective", "affine"
     )
 
@@ -848,7 +832,7 @@ class IntersectionKeys(FocalKeys):
 class StripKeys(RelativeKeys):
     """A strip formed from photos alone."""
 
-    scale_transfer: Annotated[Words, After(one_of("least_squares", "distances"))] = key(
+    scale_transfer: Annotated[str, choice("least_squares", "distances")] = key(
         "Weights of the pass points: least_squares or distances", "least_squares"
     )
 
@@ -862,7 +846,7 @@ class AbsoluteKeys(StepKeys):
 class PolynomialKeys(AbsoluteKeys):
     """The deformation of a strip along one axis."""
 
-    terms: list[Annotated[Words, After(one_of(*POWERS))]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
+    terms: list[Annotated[str, choice(*POWERS)]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
 
 
 class ResectionKeys(FocalKeys):

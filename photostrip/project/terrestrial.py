@@ -26,7 +26,6 @@ from photostrip.project.sections import (
     After,
     Axes,
     Before,
-    FirstSchema,
     Flag,
     Id,
     NotNegative,
@@ -34,14 +33,14 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    SchemaNumber,
     Section,
     Whole,
     Words,
     YAxis,
-    bounded,
+    choice,
     key,
     length,
-    one_of,
     rule,
     wrong,
 )
@@ -95,9 +94,9 @@ def refuse_outside(
 
 OWN_LIST = "phototheodolites.yaml"
 
-Distance = Annotated[Number, After(bounded(PRINCIPAL_DISTANCE))]
-Place = tuple[Annotated[Number, After(bounded(COORDINATE))], Annotated[Number, After(bounded(COORDINATE))]]
-Size = tuple[Annotated[Number, After(bounded(FORMAT))], Annotated[Number, After(bounded(FORMAT))]]
+Distance = Annotated[Number, PRINCIPAL_DISTANCE]
+Place = tuple[Annotated[Number, COORDINATE], Annotated[Number, COORDINATE]]
+Size = tuple[Annotated[Number, FORMAT], Annotated[Number, FORMAT]]
 
 
 class Preset(Section):
@@ -111,7 +110,7 @@ class Preset(Section):
 class PresetFile(Section):
     """A list of cameras."""
 
-    photostrip_cameras: FirstSchema = key("Number of this schema: 1")
+    photostrip_cameras: SchemaNumber = key("Number of this schema: 1")
     cameras: Annotated[dict[Id, Preset], length(1)] = key("Cameras by name")
 
 
@@ -472,22 +471,22 @@ KILOMETRE = 1e6  # mm
 # both faces [Pollmer 1976].
 THEODOLITES = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
 USUAL_DIRECTION = 2.0  # arcseconds
-Angle = Annotated[Number, After(bounded(DEGREES))]
-Micrometres = Annotated[Number, After(bounded(IMAGE_SIGMA_UM))]
-Seconds = Annotated[Number, After(bounded(DIRECTION_SIGMA))]
-Level = Annotated[Number, After(bounded(SIGNIFICANCE))]
-Unit = Annotated[Words, After(one_of("mm", "um"))]
+Angle = Annotated[Number, DEGREES]
+Micrometres = Annotated[Number, IMAGE_SIGMA_UM]
+Seconds = Annotated[Number, DIRECTION_SIGMA]
+Level = Annotated[Number, SIGNIFICANCE]
+Unit = Annotated[str, choice("mm", "um")]
 SIGMA = "Standard deviation of x, z and the principal distance"
 
 
 class WithCamera(Section):
     """What all of them have: the camera."""
 
-    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
+    photostrip_terrestrial: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     presets: Words | None = key("A list of cameras of your own", None)
     camera: CameraOrName = key("Camera: its name in a list, or preset, principal_distance, principal_point, format")
-    angles: Annotated[Words, After(one_of("deg", "gon"))] = key("Unit of angles and directions", "deg")
+    angles: Annotated[str, choice("deg", "gon")] = key("Unit of angles and directions", "deg")
 
 
 class Looking(WithCamera):
@@ -543,7 +542,7 @@ class AccuracyFile(Looking):
     """How accurately correction directions must be measured, all over the photo."""
 
     sigma_um: Micrometres = key(SIGMA, 5.0, unit="um")
-    step: Annotated[Number, After(bounded(STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
+    step: Annotated[Number, STEP] = key("Distance of the points of the table", 20.0, unit="mm")
     as_printed: Flag = key("The formulas as the source prints them; for a level camera", False)  # noqa: FBT003
 
     @rule
@@ -556,14 +555,14 @@ class AccuracyFile(Looking):
 class Measuring(Section):
     """How well directions are measured."""
 
-    theodolite: Annotated[Words, After(one_of(*THEODOLITES))] | None = key(
+    theodolite: Annotated[str, choice(*THEODOLITES)] | None = key(
         f"Theodolite instead of `sigma_arcsec`: {', '.join(THEODOLITES)} of Jena", None
     )
     sigma_arcsec: Seconds | None = key(
         "Standard deviation of a direction in one round, both faces", None, unit="arcsec"
     )
     vertical_arcsec: Seconds | None = key("The same of a vertical one; default: as horizontal", None, unit="arcsec")
-    rounds: Annotated[Whole, After(bounded(Range(1, 10_000, "rounds")))] = key("Rounds measured", 1)
+    rounds: Annotated[Whole, Range(1, 10_000, "rounds")] = key("Rounds measured", 1)
 
     @rule
     def _one_precision(self) -> None:
@@ -583,7 +582,7 @@ class TheodoliteFile(Looking, Measuring):
     """Which image accuracy a theodolite can vouch for, all over the photo."""
 
     sigma_um: Micrometres | None = key("Image accuracy wanted: how many rounds it needs", None, unit="um")
-    step: Annotated[Number, After(bounded(STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
+    step: Annotated[Number, STEP] = key("Distance of the points of the table", 20.0, unit="mm")
 
     @rule
     def _has_a_precision(self) -> None:
@@ -596,16 +595,16 @@ class OrientationFile(WithCamera, Measuring):
     """A photo oriented by measured directions to points in it."""
 
     table: Words = key("Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]`, .csv or .csv.gz")
-    free: list[Annotated[Words, After(one_of(*FREE))]] = key(f"Determined besides the angles: {', '.join(FREE)}", [])
-    eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
+    free: list[Annotated[str, choice(*FREE)]] = key(f"Determined besides the angles: {', '.join(FREE)}", [])
+    eccentricity: Annotated[Number, ECCENTRICITY] = key(
         "Front nodal point ahead of the theodolite's axes; needs the column `distance`", 0.0, unit="m"
     )
-    refraction: Annotated[Number, After(bounded(REFRACTION))] = key(
+    refraction: Annotated[Number, REFRACTION] = key(
         "Coefficient that computed directions lack; needs the column `distance`", 0.0
     )
     unit: Unit = key("Unit of image coordinates", "mm")
     sigma_um: Micrometres = key("Standard deviation of x and z", 5.0, unit="um")
-    screening: Annotated[Words, After(one_of(*SCREENINGS))] = key(
+    screening: Annotated[str, choice(*SCREENINGS)] = key(
         "Test points against the scatter of the others (`deletion`), the `stated` standard deviations, or not (`none`)",
         "deletion",
     )
@@ -637,7 +636,7 @@ class OneStationFile(Looking):
 class CamerasFile(Section):
     """Cameras that can be named."""
 
-    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
+    photostrip_terrestrial: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     presets: Words | None = key("A list of cameras of your own", None)
 
@@ -695,9 +694,9 @@ def _points(given: Pointed, reading: Reading, layout: tuple, limits: Range) -> t
 
 
 USUAL = MonitoringSettings()
-Coordinate = Annotated[Number, After(bounded(POSITION))]
+Coordinate = Annotated[Number, POSITION]
 Three = tuple[Coordinate, Coordinate, Coordinate]
-Angle = Annotated[Number, After(bounded(DEGREES))]
+Angle = Annotated[Number, DEGREES]
 
 
 def _short_epoch(value: object) -> object:
@@ -721,10 +720,10 @@ class Station(Section):
         " photo of the first epoch, instead of the angles",
         None,
     )
-    sigma_arcsec: Annotated[Positive, After(bounded(DIRECTION_SIGMA))] = key(
+    sigma_arcsec: Annotated[Positive, DIRECTION_SIGMA] = key(
         "Standard deviation of these directions in rows without one", 2.0, unit="arcsec"
     )
-    eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
+    eccentricity: Annotated[Number, ECCENTRICITY] = key(
         "Perspective centre ahead of `position` on the optical axis, where that is the theodolite's", 0.0, unit="m"
     )
     alpha: Angle | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
@@ -764,7 +763,7 @@ class Epoch(Section):
     """One epoch."""
 
     id: Id = key("Id of the epoch, as in the table")
-    time: Annotated[Number, After(bounded(TIME))] | None = key("Its time, for rates", None, unit="time_unit")
+    time: Annotated[Number, TIME] | None = key("Its time, for rates", None, unit="time_unit")
 
 
 class Measurements(Section):
@@ -774,7 +773,7 @@ class Measurements(Section):
     pseudo_parallaxes: Words | None = key(
         "Table `point[,epoch],x,z,p[,q],dx,dz,dx_right[,dz_right][,sigma][,sigma_d]`, .csv or .csv.gz", None
     )
-    unit: Annotated[Words, After(one_of("mm", "um"))] = key("Unit of the table: `mm` or `um`")
+    unit: Annotated[str, choice("mm", "um")] = key("Unit of the table: `mm` or `um`")
     z_axis: YAxis = key("Direction of z, `up` or `down`; x grows to the right", "up")
     sigma: Positive | None = key("Standard deviation of a coordinate in rows without one", None, unit="unit")
     sigma_d: Positive | None = key(
@@ -798,10 +797,10 @@ class Measurements(Section):
 class Processing(Section):
     """How displacements are tested."""
 
-    significance: Annotated[Number, After(bounded(SIGNIFICANCE))] = key(
+    significance: Annotated[Number, SIGNIFICANCE] = key(
         "Probability of calling a point moved that did not move", USUAL.significance
     )
-    moved_camera: Annotated[Words, After(one_of(*MOVED_CAMERA))] = key(
+    moved_camera: Annotated[str, choice(*MOVED_CAMERA)] = key(
         "Turn of a camera that the stable points show: taken out `always`, when significant (`auto`), or `never`",
         USUAL.moved_camera,
     )
@@ -810,7 +809,7 @@ class Processing(Section):
 class TerrestrialFile(Section):
     """Displacements from photos of two stations."""
 
-    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
+    photostrip_terrestrial: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the survey", "displacements")
     presets: Words | None = key("A list of cameras of your own", None)
@@ -819,8 +818,8 @@ class TerrestrialFile(Section):
     axes: Annotated[Axes, After(_ground_axes)] | None = key(
         "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
     )
-    angle_unit: Annotated[Words, After(one_of("deg", "gon"))] = key("Unit of alpha, omega, kappa", "deg")
-    base: Annotated[Number, After(bounded(BASE))] | None = key(
+    angle_unit: Annotated[str, choice("deg", "gon")] = key("Unit of alpha, omega, kappa", "deg")
+    base: Annotated[Number, BASE] | None = key(
         "Base of the normal case, instead of positions and angles", None, unit="m"
     )
     epochs: list[Annotated[Epoch, Before(_short_epoch)]] | None = key(
