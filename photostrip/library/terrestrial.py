@@ -83,18 +83,17 @@ def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple
 
 def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:
     from photostrip.project.reading import read_keys
-    from photostrip.project.terrestrial import OrientationFile, SightingUnits, only_camera, read_sightings
+    from photostrip.project.terrestrial import OrientationFile, only_camera, read_sightings
     from photostrip.sheets.directions import orientation_sheet
     from photostrip.terrestrial.orientation import orient
 
     given, reading = read_keys(OrientationFile, path, assignments)
-    camera, sightings = only_camera(given.camera, reading), None
-    units = SightingUnits(str(given.unit), str(given.angles), given.sigma_um / 1000, given.measured)
+    camera, sightings, sigma = only_camera(given.camera, reading), None, given.sigma_um / 1000
     for table, findings in reading.named(("table",)):
-        sightings = read_sightings(table, units, findings)
+        sightings = read_sightings(table, given.unit, given.angles, sigma, given.measured, findings)
     found = reading.complete(sightings)
     oriented = orient(found, camera.principal_distance, camera.principal_point, given.settings)
-    return orientation_sheet(camera, found, oriented, given.settings, str(given.angles)), reading
+    return orientation_sheet(camera, found, oriented, given.settings, given.angles), reading
 
 
 def _one_station(path: Path | None, assignments: Sequence[str]) -> Computed:
@@ -105,9 +104,8 @@ def _one_station(path: Path | None, assignments: Sequence[str]) -> Computed:
 
     given, reading = read_keys(OneStationFile, path, assignments)
     camera, measured = only_camera(given.camera, reading), None
-    sigmas = (given.sigma_um / 1000, (given.sigma_d_um or given.sigma_um) / 1000, given.sigma_distance)
     for table, findings in reading.named(("table",)):
-        measured = read_one_station(table, str(given.unit), sigmas, given.stable, camera, findings)
+        measured = read_one_station(table, given, camera, findings)
     points = reading.complete(measured)
     found = one_station(points, camera.principal_distance, given.attitude.rotation, given.significance)
     sheet = one_station_sheet(points, found, camera, given.attitude, given.significance)
