@@ -60,44 +60,48 @@ def plan(
 
 def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
     """Read a plan from its file, or from assignments to its keys alone, and compute it."""
+    from photostrip.project import plans
+    from photostrip.project.reading import read_keys
+
     match kind:
         case "model":
             from photostrip.planning.model_plan import both_forms, given_errors, plan_model
-            from photostrip.project.plans import load_model_plan
+            from photostrip.project.simulation import camera_of
             from photostrip.sheets.model_plan import model_sheet
 
-            model = load_model_plan(path, assignments)
+            model, reading = read_keys(plans.ModelPlanFile, path, assignments)
             spec, printed = model.spec, model.closed_form == "printed"
             forms = None if model.closed_form == "no" else both_forms(spec)
-            forecast, errors = plan_model(spec), given_errors(spec)
-            return Plan(model_sheet(model.name, model.camera, forecast, errors, forms, printed=printed), model.files)
+            forecast, errors, camera = plan_model(spec), given_errors(spec), camera_of(model.camera)
+            return Plan(model_sheet(model.name, camera.name, forecast, errors, forms, printed=printed), reading.files)
         case "strip":
-            from photostrip.project.plans import load_strip_plan
+            from photostrip.planning.strip_design import plan_strip
             from photostrip.sheets.strip_plan import strip_sheet
 
-            strip = load_strip_plan(path, assignments)
-            return Plan(strip_sheet(strip.name, strip.computed()), strip.reading.files)
+            strip, reading = read_keys(plans.StripPlanFile, path, assignments)
+            with reading.places(plans.SIMULATED):
+                report = plan_strip(strip.design)
+            return Plan(strip_sheet(strip.name, report), reading.files)
         case "camera":
             from photostrip.errors import Fault, InputError
-            from photostrip.project.plans import load_camera_plan
             from photostrip.sheets.plans import camera_sheet
 
             if path is None:
                 raise InputError(Fault("no cameras are given", "plan-cameras", fix="name a YAML file"))
-            cameras = load_camera_plan(path, assignments)
-            return Plan(camera_sheet(cameras.name, cameras.cameras, cameras.reference, cameras.survey), cameras.files)
+            cameras, reading = read_keys(plans.CameraPlanFile, path, assignments)
+            compared = cameras.compared
+            reference = next((each for each in compared if each.name == cameras.reference), compared[-1])
+            return Plan(camera_sheet(cameras.name, compared, reference, cameras.survey), reading.files)
         case "displacement":
-            from photostrip.project.plans import load_displacement_plan
             from photostrip.sheets.plans import displacement_sheet
 
-            survey = load_displacement_plan(path, assignments)
-            return Plan(displacement_sheet(survey.name, survey.spec), survey.files)
+            survey, reading = read_keys(plans.DisplacementPlanFile, path, assignments)
+            return Plan(displacement_sheet(survey.name, survey.spec(reading)), reading.files)
         case "screening":
             from photostrip.planning.screening import screening_experiment
-            from photostrip.project.plans import load_screening_plan
             from photostrip.sheets.plans import screening_sheet
 
-            experiment = load_screening_plan(path, assignments)
-            return Plan(screening_sheet(experiment.name, screening_experiment(experiment.spec)), experiment.files)
+            experiment, reading = read_keys(plans.ScreeningPlanFile, path, assignments)
+            return Plan(screening_sheet(experiment.name, screening_experiment(experiment.spec)), reading.files)
     message = f"there is no plan {kind!r}: model, strip, camera, displacement or screening"
     raise ValueError(message)
