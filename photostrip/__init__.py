@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from photostrip.threads import limit_threads
 
 if TYPE_CHECKING:
+    from photostrip import steps
     from photostrip.errors import GeometryError, InputError, PhotostripError
-    from photostrip.library import steps
     from photostrip.library.comparison import Comparison, compare
     from photostrip.library.plan import Plan, plan
     from photostrip.library.project import Check, Project, check, load, run
@@ -62,7 +62,7 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any of the public names)
     from importlib import import_module
 
     if name == "steps":
-        return import_module("photostrip.library.steps")
+        return import_module("photostrip.steps")
     for home, names in _HOMES.items():
         if name in names:
             found = getattr(import_module(f"photostrip.{home}"), name)

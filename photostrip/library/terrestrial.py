@@ -56,7 +56,7 @@ def terrestrial(kind: TerrestrialKind, path: Path | None, assignments: Sequence[
             needed, reading = read_keys(keys.AccuracyFile, path, assignments)
             camera, grid = _over_photo(needed, reading)
             sigma_mm, printed = needed.sigma_um / 1000, needed.as_printed
-            sheet = sheets.accuracy_sheet(camera, needed.attitude, sigma_mm, grid, as_printed=printed)
+            sheet = sheets.accuracy_sheet(camera, needed.ends, sigma_mm, grid, keys.THEODOLITES, as_printed=printed)
         case "theodolite":
             vouched, reading = read_keys(keys.TheodoliteFile, path, assignments)
             camera, grid = _over_photo(vouched, reading)
@@ -69,7 +69,7 @@ def terrestrial(kind: TerrestrialKind, path: Path | None, assignments: Sequence[
 
 def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple[Phototheodolite, Grid]:
     """Return the camera, and the grid of a table over its photo."""
-    from photostrip.project.terrestrial import MOST_POINTS, only_camera
+    from photostrip.project.terrestrial import MOST_POINTS, AccuracyFile, only_camera
     from photostrip.terrestrial.accuracy import grid
 
     camera = only_camera(given.camera, reading, whole=True)
@@ -78,7 +78,9 @@ def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple
         message = f"a step of {given.step:g} mm gives more than {MOST_POINTS} points"
         reading.refuse(("step",), message, "range", expected="a larger step")
         reading.findings.stop()
-    return camera, grid((width, height), given.step, level=given.level)
+    return camera, grid(
+        (width, height), given.step, level=given.both_level if isinstance(given, AccuracyFile) else given.level
+    )
 
 
 def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:

@@ -44,7 +44,7 @@ from photostrip.project.reading import Node
 from photostrip.project.sections import Section
 from photostrip.strip import fiducial_marks, formed_strip
 from photostrip.strip.fiducial_marks import Certificate
-from photostrip.strip.scale_transfer import StripFormationSettings
+from photostrip.strip.formed_strip import StripFormationSettings
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

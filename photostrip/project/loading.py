@@ -187,7 +187,7 @@ class Project:
 
 def adjust_project(project: Project) -> Result:
     """Adjust a project; what is refused has its place in the project file."""
-    from photostrip.pipeline.run import triangulate  # what only reads a project does without
+    from photostrip.pipeline.run import triangulate
 
     with project.places():
         return triangulate(
@@ -300,7 +300,7 @@ def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenLis
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
     """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
-    from photostrip.pipeline.plausibility import evidence
+    from photostrip.pipeline import evidence
 
     root, measured = reading.root, tables.observations
     given = valid_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)})

@@ -11,6 +11,7 @@ from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import LARGEST_NUMBER
+from photostrip.geodesy.local_frame import EARTH_RADIUS
 from photostrip.planning import camera_efficiency
 from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, HighGround
 from photostrip.planning.ideal_strip import BUNDLE, LEAST_PHOTOS, METHODS, USES, ControlLayout, Spot, StripGeometry
@@ -19,7 +20,7 @@ from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, Mode
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.planning.strip_design import Demand, DesignTask, Placement
 from photostrip.project.conversion import distortion_of
-from photostrip.project.keys import Distortion
+from photostrip.project.keys import Distortion, Ellipsoid
 from photostrip.project.reading import Reading
 from photostrip.project.sections import (
     After,
@@ -46,8 +47,8 @@ from photostrip.project.sections import (
 from photostrip.project.simulation import SimulatedCamera, camera_of
 from photostrip.project.terrestrial import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
 from photostrip.project.terrestrial import Camera as Phototheodolite
-from photostrip.strip.polynomial_terms import POWERS
-from photostrip.strip.relative_orientation.orientation import SCREENINGS
+from photostrip.strip.polynomial import POWERS
+from photostrip.strip.relative_orientation import SCREENINGS
 from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
@@ -61,6 +62,7 @@ PLACE = "x along the base and y to the left on the ground, from the left nadir, 
 SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
 DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
 FLIGHTS = ("scale", "flying_height", "height_sigma")
+STEP_ANGLES = ("omega-phi-kappa", "alpha-omega-kappa")
 PRESET = "UMK 10/1318"
 
 
@@ -666,6 +668,12 @@ class InteriorKeys(StepKeys):
     )
 
 
+class TurnedKeys(StepKeys):
+    """A step with rotations."""
+
+    angles: Annotated[str, choice(*STEP_ANGLES)] = key("System of the angles, given and found", STEP_ANGLES[0])
+
+
 class FocalKeys(StepKeys):
     """A step with photos of one camera."""
 
@@ -681,19 +689,19 @@ class RefineKeys(FocalKeys):
     ground_height: Number = key("Of the terrain, above sea level", 0.0, unit="m")
 
 
-class RelativeKeys(FocalKeys):
+class RelativeKeys(FocalKeys, TurnedKeys):
     """Two photos oriented relative to each other, and their model."""
 
     base: Positive = key("Length of the first base", 100.0, unit="unit")
     unit: Words = key("What model coordinates are in", "mm")
 
 
-class IntersectionKeys(FocalKeys):
+class IntersectionKeys(FocalKeys, TurnedKeys):
     """The rays of two photos of known orientation."""
 
     base: Triple = key("From the left to the right perspective centre", unit="unit")
-    left: Triple = key("Omega, phi, kappa of the left photo", (0.0, 0.0, 0.0), unit="deg")
-    right: Triple = key("Omega, phi, kappa of the right photo", (0.0, 0.0, 0.0), unit="deg")
+    left: Triple = key("Angles of the left photo", (0.0, 0.0, 0.0), unit="deg")
+    right: Triple = key("Angles of the right photo", (0.0, 0.0, 0.0), unit="deg")
     unit: Words = key("What coordinates are in", "m")
     left_ray: Flag = key("Y of the left ray, as printed, instead of the mean of both", False)  # noqa: FBT003
 
@@ -706,19 +714,20 @@ class StripKeys(RelativeKeys):
     )
 
 
-class AbsoluteKeys(StepKeys):
+class AbsoluteKeys(TurnedKeys):
     """A model fitted to known points."""
 
     unit: Words = key("What ground coordinates are in", "m")
 
 
-class PolynomialKeys(AbsoluteKeys):
+class PolynomialKeys(StepKeys):
     """The deformation of a strip along one axis."""
 
+    unit: Words = key("What ground coordinates are in", "m")
     terms: list[Annotated[str, choice(*POWERS)]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
 
 
-class ResectionKeys(FocalKeys):
+class ResectionKeys(FocalKeys, TurnedKeys):
     """One photo oriented on known points."""
 
     sigma_um: Positive = key("Standard deviation of an image coordinate", 5.0, unit="um")
@@ -731,3 +740,41 @@ class BundleKeys(ResectionKeys):
     base: Positive = key("Length of the first base, without control", 100.0, unit="unit")
     control: Words | None = key("Table of given points: point, x_ground, y_ground, z_ground", None)
     control_sigma: Positive = key("Standard deviation of a given coordinate", 0.05, unit="unit")
+
+
+class PairScalesKeys(StepKeys):
+    """Distances of points in two systems."""
+
+    unit: Words = key("What ground coordinates are in", "m")
+
+
+class FrameKeys(StepKeys):
+    """Geodetic coordinates taken into an intermediate frame at their middle."""
+
+    azimuth: Annotated[Number, Range(-360.0, 360.0, "deg")] = key(
+        "Of the X axis, clockwise from north", 0.0, unit="deg"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid, its semi-axes; default: WGS 84", None)
+
+
+class CurvatureKeys(StepKeys):
+    """The Earth's curvature below plane coordinates, from their middle."""
+
+    radius: Positive = key("Of the Earth in the direction of the strip", EARTH_RADIUS, unit="m")
+
+
+class ClosedFormKeys(StepKeys):
+    """Errors of points of an oriented model per error of each element, in closed form."""
+
+    control: Words = key("Table of control, given in full: point, x, y from the left nadir, mm at photo scale")
+    base: Positive = key("Photo base", unit="mm")
+    principal_distance: Positive = key("Principal distance", unit="mm")
+    as_printed: Flag = key("With the misprints of the source", default=False)
+
+
+class DeformationKeys(StepKeys):
+    """The surface that twist and bending of a model make of its heights: x, y in mm at photo scale, dz in metres."""
+
+    sigma: Positive = key("Standard deviation of dz", 0.1, unit="m")
+    scale: Positive = key("Denominator of the photo scale")
+    base: Positive = key("Photo base", unit="mm")

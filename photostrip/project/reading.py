@@ -665,7 +665,7 @@ def _fault(kind: type[Section], root: Node, problem: Any) -> Fault:  # noqa: ANN
     if get_origin(owner) is tuple and problem["type"] == "missing":  # one of its values; it has too few
         path = path[:-1]
     error = _explained(problem, str(path[-1]) if path else "", owner)
-    at, fix = (*path, error.at) if error.at else path, error.fix
+    at, fix = (*path, *error.at.split(".")) if error.at else path, error.fix
     place = root.place_of(at)
     if error.code == "unknown-key":
         name, node = str(path[-1]), root.find(*path[:-1])

@@ -80,9 +80,14 @@ LIMITS = {  # of the columns of tables
 STEEPEST = np.radians(89.9999)
 MOST_POINTS = 20_000  # of a table over the photo
 KILOMETRE = 1e6  # mm
-# Theodolites of Carl Zeiss Jena have in their names the lateral error, in mm at 1 km, of a direction observed once in
-# both faces [Pollmer 1976].
-THEODOLITES = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
+JENA = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
+# Standard deviations of a horizontal and of a vertical direction in one round, both faces, arcseconds. Those of Carl
+# Zeiss Jena have in their names the lateral error in mm at 1 km [Pollmer 1976], the T2 that of an angle in arcseconds,
+# which is the difference of two horizontal directions (GOST 10529).
+THEODOLITES = {
+    **{name: (size / KILOMETRE * ARCSECONDS,) * 2 for name, size in JENA.items()},
+    "T2": (2.0 / np.sqrt(2.0), 2.0),
+}
 USUAL_DIRECTION = 2.0  # arcseconds
 USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none
 NORMAL_AXES = ("right", "ahead", "up")
@@ -214,8 +219,8 @@ class WithCamera(CamerasFile):
     angles: AngleUnit = key("Unit of angles and directions", "deg")
 
 
-class Looking(WithCamera):
-    """Where the camera looks."""
+class Turned(Section):
+    """Where a camera looks."""
 
     alpha: Angle = key("Azimuth of the optical axis, clockwise from north", 0.0, unit="angles")
     omega: Angle = key("Elevation of the optical axis, upwards", 0.0, unit="angles")
@@ -226,17 +231,26 @@ class Looking(WithCamera):
         """Whether the optical axis and the photo's x axis are horizontal."""
         return self.omega == 0 and self.kappa == 0
 
-    @property
-    def attitude(self) -> Attitude:
-        unit = RADIANS[self.angles]
-        angles = (self.alpha * unit, self.omega * unit, self.kappa * unit)
-        return Attitude(angles, ground_from_photo(*angles), self.angles)
+    def attitude_in(self, angles: str, at: str = "") -> Attitude:
+        """Return the attitude; `angles`: their unit. Raises a fault, of a key under `at`, where it has no azimuth."""
+        unit = RADIANS[angles]
+        if abs(np.cos(self.omega * unit)) < GIMBAL:
+            message = f"with {self.omega:g} {angles} the camera looks straight up or down, and has no azimuth"
+            raise wrong(message, code="range", at=f"{at}omega", expected="an elevation below 90 degrees")
+        turned = (self.alpha * unit, self.omega * unit, self.kappa * unit)
+        return Attitude(turned, ground_from_photo(*turned), angles)
+
+
+class Looking(WithCamera, Turned):
+    """A camera and where it looks."""
 
     @rule
     def _has_an_azimuth(self) -> None:
-        if abs(np.cos(self.omega * RADIANS[self.angles])) < GIMBAL:
-            message = f"with {self.omega:g} {self.angles} the camera looks straight up or down, and has no azimuth"
-            raise wrong(message, code="range", at="omega", expected="an elevation below 90 degrees")
+        self.attitude_in(self.angles)
+
+    @property
+    def attitude(self) -> Attitude:
+        return self.attitude_in(self.angles)
 
 
 class Pointed(Looking):
@@ -274,10 +288,25 @@ class AccuracyFile(OverPhoto):
 
     sigma_um: Micrometres = key(SIGMA, 5.0, unit="um")
     as_printed: Flag = key("The formulas as the source prints them; for a level camera", default=False)
+    right: Turned | None = key("Where the camera at the right end of the base looks; default: as the left one", None)
+
+    @property
+    def both_level(self) -> bool:
+        return self.level and (self.right is None or self.right.level)
+
+    @property
+    def ends(self) -> list[Attitude]:
+        """Attitudes at both ends of the base; one where they are the same."""
+        return [self.attitude] if self.right is None else [self.attitude, self.right.attitude_in(self.angles)]
+
+    @rule
+    def _right_end_has_an_azimuth(self) -> None:
+        if self.right is not None:
+            self.right.attitude_in(self.angles, "right.")
 
     @rule
     def _printed_for_a_level_camera(self) -> None:
-        if self.as_printed and not self.level:
+        if self.as_printed and not self.both_level:
             message = "the printed formulas hold for a level camera"
             raise wrong(message, code="as-printed", at="as_printed", fix="leave out `omega` and `kappa`")
 
@@ -286,7 +315,7 @@ class Measuring(Section):
     """How well directions are measured."""
 
     theodolite: Annotated[str, choice(*THEODOLITES)] | None = key(
-        f"Theodolite instead of `sigma_arcsec`: {', '.join(THEODOLITES)} of Jena", None
+        f"Theodolite instead of `sigma_arcsec`: {', '.join(THEODOLITES)}", None
     )
     sigma_arcsec: Seconds | None = key(
         "Standard deviation of a direction in one round, both faces", None, unit="arcsec"
@@ -302,10 +331,9 @@ class Measuring(Section):
 
     @property
     def measured(self) -> Theodolite:
-        horizontal = self.sigma_arcsec or USUAL_DIRECTION
-        if self.theodolite is not None:
-            horizontal = THEODOLITES[self.theodolite] / KILOMETRE * ARCSECONDS
-        return Theodolite(horizontal, self.vertical_arcsec or horizontal, self.rounds)
+        usual = self.sigma_arcsec or USUAL_DIRECTION
+        horizontal, vertical = (usual, usual) if self.theodolite is None else THEODOLITES[self.theodolite]
+        return Theodolite(horizontal, self.vertical_arcsec or vertical, self.rounds)
 
 
 class TheodoliteFile(OverPhoto, Measuring):

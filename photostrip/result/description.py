@@ -20,9 +20,8 @@ LEFT_OUT = (
     "statement",
     "certificate",
     "residuals",
-    "parallaxes",
     "link_residuals",
-    "covariances",
+    "correlations",
     "fiducial_marks",
 )
 BRACES = re.compile(r"\{([^}]*)\}")
@@ -40,6 +39,7 @@ class Quantity:
     unit_key: str = ""  # key of the same block or table that names the unit
     many: bool = False  # whether a list of such values stands there
     optional: bool = False  # whether it may be missing, where a kind of project does not have it
+    derived: bool = False  # whether other columns tell it: it does not stand in result.json
     # kind of tolerance by which two results are compared; name: a column that names its rows; empty: not compared
     compared: str = ""
 
@@ -88,8 +88,9 @@ def _everything() -> Block:
                 place.optional = line.endswith("?")
         elif line and not line.startswith("#"):
             keys, form, meaning, *compared = line.split(" | ")
-            entry = replace(Quantity.of(form, meaning), optional=keys.endswith("?"), compared="".join(compared))
-            for path in _expanded(keys.removesuffix("?")):
+            entry = replace(Quantity.of(form, meaning), optional=keys[-1] in "?*", compared="".join(compared))
+            entry = replace(entry, derived=keys.endswith("*"))
+            for path in _expanded(keys.rstrip("?*")):
                 above, _, last = path.rpartition(".")
                 for place in places:
                     (_made(place, above, Block) if above else place)[last] = entry

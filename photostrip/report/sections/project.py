@@ -102,7 +102,8 @@ def adjustment_of(document: Document) -> str:
 def _adjustment_of(document: Document) -> str:
     if document["adjustment"] != "polynomial":
         return str(document["adjustment"])
-    return f"polynomial, degree {document['settings']['polynomial']['degree']}"
+    asked = document["settings"]["polynomial"]["degree"]
+    return f"polynomial, degree {'by evidence' if asked == 'auto' else f'{asked} asked for'}"
 
 
 def cameras_of(document: Document) -> dict[str, Document]:
