@@ -208,7 +208,10 @@ def test_a_list_of_the_user_adds_and_replaces(tmp_path: Path) -> None:
     ("text", "expected"),
     [
         ("cameras: {}\n", ["mine.yaml:1:1: photostrip_cameras: `photostrip_cameras` is missing", "there is no camera"]),
-        ("photostrip_cameras: 2\ncameras: {A: {principal_distance: 1}}\n", ["mine.yaml:1:21: photostrip_cameras: this"]),
+        (
+            "photostrip_cameras: 2\ncameras: {A: {principal_distance: 1}}\n",
+            ["mine.yaml:1:21: photostrip_cameras: this"],
+        ),
         (
             "photostrip_cameras: 1\ncameras:\n  A: {principal_distance: -3}\n  B: {principal_distanc: 3}\n",
             ["mine.yaml:3:27: cameras.A.principal_distance: -3 is out of range", "mine.yaml:4:", "did you mean"],
