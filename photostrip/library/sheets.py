@@ -13,9 +13,11 @@ from photostrip.notes import Document, Note
 from photostrip.planning import PlanKind
 from photostrip.planning.model_plan import both_forms, given_errors, plan_model
 from photostrip.planning.screening import screening_experiment
+from photostrip.planning.strip_design import plan_strip
 from photostrip.project import plans
 from photostrip.project import terrestrial as keys
 from photostrip.project.reading import Reading, read_keys
+from photostrip.project.simulation import camera_of
 from photostrip.sheets import directions, displacements
 from photostrip.sheets.model_plan import model_sheet
 from photostrip.sheets.plans import camera_sheet, displacement_sheet, screening_sheet
@@ -74,25 +76,29 @@ def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
     """Read a plan from its file, or from assignments to its keys alone, and compute it."""
     match kind:
         case "model":
-            model = plans.load_model_plan(path, assignments)
-            spec, printed = model.spec, model.closed_form == "printed"
+            model, reading = read_keys(plans.ModelPlanFile, path, assignments)
+            spec, printed, name = model.spec, model.closed_form == "printed", camera_of(model.camera).name
             forms = None if model.closed_form == "no" else both_forms(spec)
             forecast, errors = plan_model(spec), given_errors(spec)
-            return Plan(model_sheet(model.name, model.camera, forecast, errors, forms, printed=printed), model.files)
+            return Plan(model_sheet(model.name, name, forecast, errors, forms, printed=printed), reading.files)
         case "strip":
-            strip = plans.load_strip_plan(path, assignments)
-            return Plan(strip_sheet(strip.name, strip.computed()), strip.reading.files)
+            strip, reading = read_keys(plans.StripPlanFile, path, assignments)
+            with reading.places(plans.SIMULATED):
+                report = plan_strip(strip.design)
+            return Plan(strip_sheet(strip.name, report), reading.files)
         case "camera":
             if path is None:
                 raise InputError(Fault("no cameras are given", "plan-cameras", fix="name a YAML file"))
-            cameras = plans.load_camera_plan(path, assignments)
-            return Plan(camera_sheet(cameras.name, cameras.cameras, cameras.reference, cameras.survey), cameras.files)
+            cameras, reading = read_keys(plans.CameraPlanFile, path, assignments)
+            compared = cameras.compared
+            reference = next((each for each in compared if each.name == cameras.reference), compared[-1])
+            return Plan(camera_sheet(cameras.name, compared, reference, cameras.survey), reading.files)
         case "displacement":
-            survey = plans.load_displacement_plan(path, assignments)
-            return Plan(displacement_sheet(survey.name, survey.spec), survey.files)
+            survey, reading = read_keys(plans.DisplacementPlanFile, path, assignments)
+            return Plan(displacement_sheet(survey.name, survey.spec(reading)), reading.files)
         case "screening":
-            tried = plans.load_screening_plan(path, assignments)
-            return Plan(screening_sheet(tried.name, screening_experiment(tried.spec)), tried.files)
+            tried, reading = read_keys(plans.ScreeningPlanFile, path, assignments)
+            return Plan(screening_sheet(tried.name, screening_experiment(tried.spec)), reading.files)
     message = f"there is no plan {kind!r}: model, strip, camera, displacement or screening"
     raise ValueError(message)
 
@@ -163,21 +169,19 @@ def _over_photo(
 
 def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:
     given, reading = read_keys(keys.OrientationFile, path, assignments)
-    camera, sightings = keys.only_camera(given.camera, reading), None
-    units = keys.SightingUnits(str(given.unit), str(given.angles), given.sigma_um / 1000, given.measured)
+    camera, sightings, sigma = keys.only_camera(given.camera, reading), None, given.sigma_um / 1000
     for table, findings in reading.named(("table",)):
-        sightings = keys.read_sightings(table, units, findings)
+        sightings = keys.read_sightings(table, given.unit, given.angles, sigma, given.measured, findings)
     measured = reading.complete(sightings)
     oriented = orient(measured, camera.principal_distance, camera.principal_point, given.settings)
-    return directions.orientation_sheet(camera, measured, oriented, given.settings, str(given.angles)), reading
+    return directions.orientation_sheet(camera, measured, oriented, given.settings, given.angles), reading
 
 
 def _one_station(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:
     given, reading = read_keys(keys.OneStationFile, path, assignments)
     camera, measured = keys.only_camera(given.camera, reading), None
-    sigmas = (given.sigma_um / 1000, (given.sigma_d_um or given.sigma_um) / 1000, given.sigma_distance)
     for table, findings in reading.named(("table",)):
-        measured = keys.read_one_station(table, str(given.unit), sigmas, given.stable, camera, findings)
+        measured = keys.read_one_station(table, given, camera, findings)
     points = reading.complete(measured)
     moved = one_station(points, camera.principal_distance, given.attitude.rotation, given.significance)
     return displacements.one_station_sheet(points, moved, camera, given.attitude, given.significance), reading
