@@ -33,9 +33,9 @@ ENDINGS: dict[str, Format] = {".txt": "text", ".json": "json", ".md": "md"}
 
 def ascii_only() -> bool:
     """Whether stdout can show ASCII letters only."""
-    from photostrip.report.page import console
+    from photostrip.report.page import layout
 
-    return not console.speaks_unicode(sys.stdout)
+    return not layout.speaks_unicode(sys.stdout)
 
 
 def print_json(document: Document) -> None:
@@ -47,18 +47,18 @@ def print_json(document: Document) -> None:
 
 def print_sections(title: str, sections: Iterable[Section], width: int | None = None, *, markdown: bool) -> None:
     """Print sections as Markdown, or as text: in colours and as wide as the terminal, where there is one."""
-    from photostrip.report.page import console, text
+    from photostrip.report.page import layout
 
     if markdown:
-        sys.stdout.write(text.to_markdown(title, sections, ascii_only=ascii_only()))
+        sys.stdout.write(layout.to_markdown(title, sections, ascii_only=ascii_only()))
     else:
-        console.print_report(title, sections, sys.stdout, width)
+        layout.print_report(title, sections, sys.stdout, width)
 
 
 def print_result(document: Document, form: Format, width: int | None, parts: Parts) -> None:
     """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
     if form == "text":
-        from photostrip.report.page.console import page_width
+        from photostrip.report.page.layout import page_width
 
         print_sections(*_report(document, parts, width or page_width()), width, markdown=False)
     else:
@@ -75,7 +75,7 @@ def report_text(
     ascii_letters: bool = False,
 ) -> str:
     """Return the report of a result as text, without colours."""
-    from photostrip.report.page import layout, text
+    from photostrip.report.page import layout
 
     if form == "json":
         from photostrip.formats.output.result_json import to_json
@@ -87,8 +87,8 @@ def report_text(
         return annotated(result_findings(document))
     title, sections = _report(document, parts, width or layout.USUAL)
     if form == "md":
-        return text.to_markdown(title, sections, ascii_only=ascii_letters)
-    return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_letters)
+        return layout.to_markdown(title, sections, ascii_only=ascii_letters)
+    return layout.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_letters)
 
 
 def _report(document: Document, parts: Parts, width: int) -> tuple[str, tuple[Section, ...]]:

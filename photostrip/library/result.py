@@ -300,13 +300,13 @@ def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, 
         from photostrip.report.html import to_html
 
         return to_html(document)
-    from photostrip.report.page import layout, text
+    from photostrip.report.page import layout
     from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
 
     names = [SectionName(each) for each in sections]
     chosen = chosen_sections(document, names=names, everything=everything, width=layout.USUAL)
     title = "" if sections else title_of(document)
-    return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
+    return layout.to_markdown(title, chosen) if form == "md" else layout.to_text(title, chosen, layout.USUAL)
 
 
 def _checked(document: Document) -> Document:

@@ -27,8 +27,9 @@ from photostrip.project import steps as keys
 from photostrip.project.sections import Section
 from photostrip.project.yaml.reading import read_keys
 from photostrip.report.page.parts import DASH, Facts
+from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
-from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
+from photostrip.sheets.sheet import Rows, Sheet, by_columns
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
 from photostrip.strip.intersection import lies_across

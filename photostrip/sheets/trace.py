@@ -16,9 +16,10 @@ from photostrip.notes import counted
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.report.page.parts import Facts, Part, Words
+from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, written
+from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, intersect_models
 from photostrip.strip.polynomial_terms import POWERS

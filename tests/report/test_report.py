@@ -14,11 +14,10 @@ from scipy import stats
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import checked, to_json
 from photostrip.library.result import Result
-from photostrip.report.page.layout import cells
+from photostrip.report.page.layout import cells, to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
-from photostrip.report.page.text import to_markdown, to_text
+from photostrip.report.page.tables import ALL_SHOWN, WORST_SHOWN
 from photostrip.report.sections.accuracy_report import chosen_sections, sections_of, title_of
-from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
 from photostrip.result.table import Table as ResultTable
 from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
@@ -213,7 +212,7 @@ def test_every_number_of_a_table_has_its_unit() -> None:
     """A column of numbers has a unit, or counts something, or is a ratio, which its name says."""
     without = {
         "points", "rej.", "condition", "scale ratio", "σ0", "redund.", "degree", "terms", "F", "p", "coefficient", "σ",
-        "t", "ratio", "z plan", "z height", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked",
+        "t", "ratio", "z plan", "z height", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked", "list",
     }  # fmt: skip
     for found in nonempty(sections_of(saved())):
         for table in tables(found):

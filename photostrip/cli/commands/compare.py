@@ -56,7 +56,7 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.library.again import compare_again
     from photostrip.library.comparison import compare as compared
     from photostrip.project.tolerances import load_tolerances
-    from photostrip.report.commands.comparisons import TRUTH
+    from photostrip.report.commands.compare import TRUTH
     from photostrip.visible import visible
 
     if (baseline is None) is not again or (update and again) or (project is not None and not again):
@@ -83,10 +83,8 @@ def compare(  # noqa: PLR0913, PLR0917 (an argument for each option)
 def _print(found: dict[str, Any], form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool) -> None:
     from photostrip.formats.output.result_json import text_of
     from photostrip.formats.output.result_lines import line_finder
-    from photostrip.report.commands.compare_findings import compare_cases, compare_findings
-    from photostrip.report.commands.comparisons import comparison_report
-    from photostrip.report.page.junit import to_junit
-    from photostrip.report.page.messages import annotated
+    from photostrip.report.commands.compare import compare_cases, compare_findings, comparison_report
+    from photostrip.report.page.messages import annotated, to_junit
 
     match form:
         case "json":

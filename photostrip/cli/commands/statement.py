@@ -56,7 +56,7 @@ def statement(
         elif wanted == "json":
             print_json(found)
         else:
-            from photostrip.report.statements.statement import statement_report
+            from photostrip.report.sections.statement import statement_report
 
             print_sections(*statement_report(found, quiet=quiet), width, markdown=wanted == "md")
     return exit_code(found["status"])
@@ -64,7 +64,7 @@ def statement(
 
 def _page(found: Document) -> str:
     from photostrip.report.html import sections_html
-    from photostrip.report.statements.statement import statement_report
+    from photostrip.report.sections.statement import statement_report
 
     title, sections = statement_report(found)
     return sections_html(title, found["version"], sections)
@@ -72,8 +72,8 @@ def _page(found: Document) -> str:
 
 def _text(found: Document, form: Format, width: int | None, *, quiet: bool) -> str:
     """Return the statement as a file holds it."""
-    from photostrip.report.page import layout, text
-    from photostrip.report.statements.statement import statement_report
+    from photostrip.report.page import layout
+    from photostrip.report.sections.statement import statement_report
 
     if form == "json":
         from photostrip.formats.output.result_json import to_json
@@ -81,5 +81,5 @@ def _text(found: Document, form: Format, width: int | None, *, quiet: bool) -> s
         return to_json(found)
     title, sections = statement_report(found, quiet=quiet)
     if form == "md":
-        return text.to_markdown(title, sections)
-    return text.to_text(title, sections, width or layout.USUAL)
+        return layout.to_markdown(title, sections)
+    return layout.to_text(title, sections, width or layout.USUAL)

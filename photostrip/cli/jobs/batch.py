@@ -21,7 +21,7 @@ from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
 from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
-from photostrip.report.page import messages, text
+from photostrip.report.page import layout, messages
 from photostrip.report.page.progress import BatchProgress, batch_progress
 from photostrip.visible import visible, visible_json
 
@@ -123,7 +123,7 @@ def write_summaries(run: Run, code: int, folder: ResultFolder, *, html: bool = F
         write_files(
             folder.path,
             {
-                "summary.txt": text.to_text("", batch_sections(run.outcomes, everything=True)),
+                "summary.txt": layout.to_text("", batch_sections(run.outcomes, everything=True)),
                 "summary.csv": formats.summary_csv(run.outcomes),
                 **pages,
                 "junit.xml": batch_junit(run.outcomes),

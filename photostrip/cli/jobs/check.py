@@ -12,7 +12,7 @@ from photostrip.cli.stdout import Format, ascii_only, print_sections
 from photostrip.project.check import Checked
 from photostrip.report.commands.check import check_sections, verdict
 from photostrip.report.page import messages
-from photostrip.report.page.text import to_markdown
+from photostrip.report.page.layout import to_markdown
 from photostrip.visible import visible, visible_json
 
 SCHEMA = 1

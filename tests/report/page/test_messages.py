@@ -9,7 +9,7 @@ from photostrip.notes import Note
 from photostrip.plausibility import found
 from photostrip.report.page.messages import MOST_OF_A_KIND, finding_of, lines_of
 from photostrip.report.page.parts import Words
-from photostrip.report.sections.findings import cures_section, findings_sections
+from photostrip.report.sections.verdict import cures_section, findings_sections
 from tests.reports import saved
 
 SHARED = [found("P301", f"point {number} stands for two points", "", points=(f"{number}",)) for number in range(4427)]

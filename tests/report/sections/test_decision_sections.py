@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from photostrip.report.page.parts import Facts, Table
-from photostrip.report.sections.decisions import WEIGHTS_SHOWN, decisions_section, weights_section
+from photostrip.report.page.tables import ALL_SHOWN
+from photostrip.report.sections.points import weights_section
+from photostrip.report.sections.project import decisions_section
 from tests.loops import nonempty
 from tests.results import by_rows, case, in_tables
 
@@ -81,7 +83,7 @@ def test_long_lists_are_cut_and_say_so() -> None:
     row = next(each for each in document["control"] if each["role"] == "control")
     document["control"] = [row | {"id": f"G{n}", "list": 1 + n % 2} for n in range(40)]
     table = weights(document)
-    assert len(table.rows) == WEIGHTS_SHOWN
+    assert len(table.rows) == ALL_SHOWN
     assert "16 more points: --section weights, or `control` in result.json" in table.note
     assert "axes of each list" in table.note
     assert len(weights(document, everything=True).rows) == 40

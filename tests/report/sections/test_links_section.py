@@ -7,10 +7,11 @@ import numpy as np
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.report.page.parts import Table
-from photostrip.report.sections.models import links_section
-from photostrip.report.sections.strip import ALL_SHOWN
+from photostrip.report.page.tables import ALL_SHOWN
+from photostrip.report.sections.formation import links_section
 from photostrip.result.document import document_of
 from tests.models import inputs, truth
+from tests.results import in_tables
 
 
 def test_links_without_redundancy_are_not_the_worst() -> None:
@@ -20,7 +21,7 @@ def test_links_without_redundancy_are_not_the_worst() -> None:
     link = document["links"][0]
     document["links"] = [link | {"before": "none", "sigma0": None} for _ in range(ALL_SHOWN)]
     document["links"] += [link | {"before": "some", "sigma0": 0.5} for _ in range(ALL_SHOWN)]
-    (table,) = [part for part in links_section(document, everything=False).parts if isinstance(part, Table)]
+    (table,) = [part for part in links_section(in_tables(document), everything=False).parts if isinstance(part, Table)]
     cells = " ".join(cell for row in table.rows for cell in row)
     assert "some" in cells
     assert "none" not in cells

@@ -10,8 +10,8 @@ import pytest
 
 import photostrip
 from photostrip.report.html import to_html
+from photostrip.report.page.layout import to_text
 from photostrip.report.page.parts import Facts, Table
-from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import SectionName, chosen_sections
 from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from photostrip.formats.output.result_json import read_baseline
+from photostrip.report.page.layout import to_text
 from photostrip.report.page.parts import Facts, Section, Table, Words
-from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, sections_of, title_of
 from photostrip.report.sections.overview import MOST_LINES, overview
 from tests.loops import nonempty
