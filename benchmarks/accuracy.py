@@ -31,7 +31,7 @@ import numpy as np  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.strip import polynomial, polynomial_terms  # noqa: E402
+from photostrip.strip import polynomial  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _degrees(result: Result) -> tuple[int, int]:
     found = result.strips[0].polynomial
     if found is None:
         return 0, 0
-    plan, _, height = ([polynomial_terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    plan, _, height = ([polynomial.POWERS[term][0] for term in axis.terms] for axis in found.axes)
     return max(plan, default=0), max(height, default=0)
 
 

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 from benchmarks import peers  # noqa: E402
 from benchmarks.accuracy import table  # noqa: E402
 from photostrip.network.adjustment import solve  # noqa: E402
-from photostrip.network.cofactors import cofactors_of  # noqa: E402
+from photostrip.network.reliability import cofactors_of  # noqa: E402
 from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 from tests.simulated_bundle import problem_of  # noqa: E402
 

@@ -56,7 +56,7 @@ from photostrip.camera import Camera
 from photostrip.errors import InputError, PhotostripError
 from photostrip.geometry.rotation import angles, from_angles
 from photostrip.notes import LOST_SAY
-from photostrip.pipeline.plausibility import gate
+from photostrip.pipeline import gate
 from photostrip.pipeline.run import triangulate
 from photostrip.points import locate
 from photostrip.result.document import document_of

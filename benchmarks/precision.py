@@ -24,14 +24,14 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
+from photostrip.pipeline.formed_photos import form_strip  # noqa: E402
 from photostrip.pipeline.inputs import Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
-from photostrip.pipeline.strips.method import adjust_formed  # noqa: E402
-from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
+from photostrip.pipeline.strip_method import adjust_formed  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
 from photostrip.strip import polynomial  # noqa: E402
-from photostrip.strip.relative_orientation.orientation import RelativeSettings  # noqa: E402
+from photostrip.strip.relative_orientation import RelativeSettings  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:

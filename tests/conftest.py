@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
-from photostrip.cli.main import NEW_OBJECTS
+from photostrip.cli.main import NEW_OBJECTS, main
 from photostrip.threads import limit_threads
 from tests.forked import Forks
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from photostrip.pipeline.results import Result
+    from tests.calls import Answer, Call, Capture
 
 limit_threads()  # before a test imports numpy
 multiprocessing.set_executable(sys.executable)  # before a test puts a copy of an interpreter in its place
@@ -36,6 +37,31 @@ def _plain_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
     for forcing in ("FORCE_COLOR", "CLICOLOR_FORCE", "PY_COLORS"):
         monkeypatch.delenv(forcing, raising=False)
+
+
+@pytest.fixture
+def call(capsys: Capture) -> Call:
+    """Give a function that runs a command as it is typed; what was printed before is not in what it gives."""
+
+    def typed(*arguments: object) -> tuple[int, str, str]:
+        capsys.readouterr()
+        code = main([str(each) for each in arguments])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return typed
+
+
+@pytest.fixture
+def answer(call: Call) -> Answer:
+    """Give a function that gives what a command prints, which must succeed."""
+
+    def typed(*arguments: object) -> str:
+        code, out, _ = call(*arguments)
+        assert code == 0
+        return out
+
+    return typed
 
 
 @pytest.fixture(scope="session")
@@ -60,7 +86,7 @@ def _quick_start(forks: Forks, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def _adjusted_once(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """Let commands take over what the same data gave before, where a test looks at what is done with a result."""
-    from photostrip.pipeline import run  # not for tests without any
+    from photostrip.pipeline import run
     from tests.results import known
 
     triangulate = run.triangulate
@@ -77,7 +103,7 @@ def _adjusted_each_time(_adjusted_once: Callable[..., Result], monkeypatch: pyte
 @pytest.fixture
 def _no_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out what the data say against themselves, where many repetitions are adjusted for their numbers alone."""
-    monkeypatch.setattr("photostrip.pipeline.plausibility.gate.of_result", lambda *_: ())
+    monkeypatch.setattr("photostrip.pipeline.gate.of_result", lambda *_: ())
 
 
 class Backwards(pytest.Dir):  # type: ignore[misc]  # final for its names, which stay

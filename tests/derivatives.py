@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.pipeline.formed_photos import FormedPhotos
+from photostrip.pipeline.photos_on_control import OrientedPhotos, OrientedStrip
 from photostrip.pipeline.precision import fitted
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.absolute import OrientedPhotos, OrientedStrip
-from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
-from photostrip.strip.relative_orientation.orientation import RelativeSettings
+from photostrip.strip.relative_orientation import RelativeSettings
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:

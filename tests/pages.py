@@ -10,8 +10,7 @@ What stands behind the three backticks says what a block is::
     ANY file=NAME       the block is written to NAME in the scratch folder before it is treated further
     sh                  shown only: make, pip, git, which belong to a fresh clone
 
-stdout is compared; stderr only where the command says ``2>&1``. A line ``<!-- table: NAME -->`` stands before a table
-that ``page_tables`` makes.
+stdout is compared; stderr only where the command says ``2>&1``.
 """
 
 from __future__ import annotations
@@ -26,12 +25,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip.errors import InputError
-from tests.page_tables import TABLES
 from tests.source_tree import ROOT
 
 FENCE = "```"
 FRESH_CLONE = re.compile(r"(^|[|;&]\s*)(make|pip|git|python\S* -m (pip|venv))\b")
-TABLE = re.compile(r"<!-- table: ([\w-]+) -->")
 COPIED = ("sample_data", "configs")
 
 
@@ -103,22 +100,6 @@ def blocks(page: Path) -> list[Block]:
             found.append(Block(page, start + 1, words, tuple(lines[start:number]), above))
         number += 1
     return found
-
-
-def with_tables(lines: list[str]) -> list[str]:
-    """Give the lines of a page with its tables as the program makes them."""
-    made: list[str] = []
-    place = 0
-    while place < len(lines):
-        made.append(lines[place])
-        found = TABLE.fullmatch(lines[place])
-        place += 1
-        if found:
-            made += ["", *TABLES[found[1]]()]
-            while place < len(lines) and (not lines[place] or lines[place].startswith("|")):
-                place += 1
-            made += [""] if place < len(lines) else []
-    return made
 
 
 def steps(block: Block) -> list[Step]:
@@ -196,9 +177,6 @@ def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> lis
     """Run every block of `page` and give what does not do what the page says."""
     scratch = Scratch(folder, command)
     found = []
-    lines = page.read_text(encoding="utf-8").splitlines()
-    if lines != with_tables(lines):
-        found.append(f"{page.name}: a table is not what the program makes (renew with `make docs`)")
     for block in blocks(page):
         if name := block.option("file"):
             scratch.write(name, block.lines)
@@ -255,4 +233,4 @@ def renewed(page: Path, folder: Path) -> str:
         first = block.line - 1 + shift
         lines[first : first + len(block.lines)] = fresh
         shift += len(fresh) - len(block.lines)
-    return "\n".join(with_tables(lines)) + "\n"
+    return "\n".join(lines) + "\n"

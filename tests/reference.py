@@ -1,6 +1,7 @@
-"""Make a copy of docs/ ready for the site (``python -m tests.reference COPY``): the reference, plain fences.
+"""Make a copy of docs/ ready for the site (``python -m tests.reference COPY``): reference, tables, plain fences.
 
-Names come from docstrings, commands from their help, keys of a result from their description.
+Names come from docstrings, commands from their help, keys of files from their descriptions, findings from their kinds.
+A line ``<!-- table: NAME -->`` of a page becomes the table of that name.
 """
 
 from __future__ import annotations
@@ -20,10 +21,14 @@ import typer
 import photostrip
 from photostrip.cli.main import COMMANDS, PROGRAM
 from photostrip.cli.main import main as command_line
+from photostrip.plausibility import KINDS
+from photostrip.plausibility.finding import CAUSES
+from photostrip.project.editors import KINDS as FILES
+from photostrip.project.editors import keys_page
 from photostrip.result.schema import result_page
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
 ARGUMENT = re.compile(r"(?:[a-z_]\w*(?:, (?=[a-z_]))?)+: ")  # ``left, right: ...`` in a docstring
 PARAGRAPH = re.compile(r"(Returns|Raises|Source:?) ?")
@@ -208,19 +213,60 @@ def command_page() -> str:
     return "\n".join(lines)
 
 
-def keys_page() -> str:
-    """Write every key of result.json."""
-    head = [
-        "# Reference: keys of result.json",
-        "",
-        "What the blocks are for: see [the result](../files/result.md).",
-        "",
-    ]
-    return "\n".join(head) + "\n" + result_page()
+def key_pages() -> dict[str, str]:
+    """Write the keys of result.json, and those of all files that no page of their own has."""
+    lines = ["# Reference: keys of plans, terrestrial computations, steps, tolerance profiles", ""]
+    for kind, (*_, title) in FILES.items():
+        if kind not in TABLES:
+            lines += [f"## {title}", "", re.sub(r"(?m)^### `", "### in `", keys_page(kind))]
+    above = "# Reference: keys of result.json\n\nWhat the blocks are for: see [the result](../files/result.md).\n\n"
+    return {"keys": "\n".join(lines), "result": above + result_page()}
 
 
-def plain_fences(page: str) -> str:
-    """Take away what stands behind the kind of a block for ``tests/pages.py``: sites take such a line for prose."""
+def causes() -> str:
+    """List what competes in an adjustment."""
+    rows = [
+        (cause.title, cause.shows, ", ".join(name if name in KINDS else f"`{name}`" for name in cause.told),
+         cause.cure, cause.example)
+        for cause in CAUSES.values()
+    ]  # fmt: skip
+    return _table(("cause", "how it shows", "told as", "what cures it", "example"), rows)
+
+
+def findings() -> str:
+    """List every kind of finding, errors in bold."""
+    rows = [(code, f"**{kind.title}**" if kind.severity == "error" else kind.title, kind.shows)
+            for code, kind in KINDS.items()]  # fmt: skip
+    return _table(("code", "finding (in bold: an error)", "how it shows"), rows)
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows))
+
+
+def rooms() -> str:
+    """List the rooms of the program with what their docstrings say first."""
+    root = Path(photostrip.__file__).parent
+    rows = [
+        (f"`{folder.parent.relative_to(root).as_posix()}/`",
+         (ast.get_docstring(ast.parse(folder.read_text(encoding="utf-8"))) or "").partition("\n")[0].replace("``", "`"))
+        for folder in sorted(root.rglob("__init__.py"))[1:]
+    ]  # fmt: skip
+    return _table(("room", "what it holds"), rows)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "causes": causes,
+    "findings": findings,
+    "rooms": rooms,
+    "project": lambda: keys_page("project"),
+    "simulation": lambda: keys_page("simulation"),
+}
+
+
+def for_the_site(page: str) -> str:
+    """Put the tables in, and take away what stands behind the kind of a block: sites take such a line for prose."""
+    page = re.sub(r"(?m)^<!-- table: (\w+) -->$", lambda found: TABLES[found[1]](), page)
     return re.sub(r"(?m)^(```[a-z]+) .*$", r"\1", page)
 
 
@@ -229,12 +275,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path, metavar="COPY")
     copy = parser.parse_args().folder
     for page in copy.rglob("*.md"):
-        page.write_text(plain_fences(page.read_text(encoding="utf-8")), encoding="utf-8")
+        page.write_text(for_the_site(page.read_text(encoding="utf-8")), encoding="utf-8")
     folder = copy / "reference"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "commands.md").write_text(command_page(), encoding="utf-8")
-    (folder / "result.md").write_text(keys_page(), encoding="utf-8")
+    for name, text in key_pages().items():
+        (folder / f"{name}.md").write_text(text, encoding="utf-8")
     with (folder / "sources.md").open("w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
         command_line(["sources", "--format", "md"])
 

@@ -15,6 +15,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.library import result as library
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
+from photostrip.result.derived import with_derived
 from photostrip.result.description import Block, Columns, described
 from photostrip.result.document import document_of
 from photostrip.result.quantities import MATRIX
@@ -152,7 +153,7 @@ def in_tables(value: Any, block: Block | None = None) -> Any:  # noqa: ANN401
             found[key] = Table(key, columns, entry)
         elif isinstance(entry, Block) and isinstance(value.get(key), dict):
             found[key] = in_tables(value[key], entry)
-    return in_frame(found) if block is None and "frame" in found else found
+    return in_frame(with_derived(found)) if block is None and "frame" in found else found
 
 
 def columns_of(rows: list[Document]) -> dict[str, list[Any]]:

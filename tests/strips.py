@@ -15,15 +15,14 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip.absolute_orientation import Targets
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs
+from photostrip.strip.relative_orientation import Pairs, collect_pairs, orient_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.strip.relative_orientation.orientation import Orientation
+    from photostrip.strip.relative_orientation import Orientation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

@@ -84,9 +84,17 @@ def test_formulas_stand_alone(page: Path) -> None:
 def test_the_site_has_every_page_in_its_menu() -> None:
     menu = re.findall(r'"([\w/-]+\.md)"', (ROOT / "zensical.toml").read_text(encoding="utf-8"))
     assert len(menu) == len(set(menu))
-    made = [f"reference/{name}.md" for name in ("commands", "python", "result", "sources")]
+    made = [f"reference/{name}.md" for name in ("commands", "keys", "python", "result", "sources")]
     written = [page.relative_to(ROOT / "docs").as_posix() for page in pages() if page.name != "README.md"]
     assert sorted(menu) == sorted([*written, *made])
+
+
+def test_headings_have_the_words_that_newcomers_search_for() -> None:
+    table = (ROOT / "docs/tests.md").read_text(encoding="utf-8").partition("| search | page |")[2].partition("\n\n")[0]
+    for words, page in nonempty(re.findall(r"\| ([\w ]+) \| ([\w/-]+\.md) \|", table)):
+        headings = re.findall(r"(?m)^#+ .+$", (ROOT / "docs" / page).read_text(encoding="utf-8"))
+        asked = set(words.lower().split())
+        assert any(asked <= set(re.findall(r"\w+", heading.lower())) for heading in headings), words
 
 
 def test_no_page_of_the_site_links_out_of_it() -> None:

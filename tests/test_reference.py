@@ -7,7 +7,8 @@ import re
 import photostrip
 from photostrip.cli.main import COMMANDS
 from tests.loops import nonempty
-from tests.reference import command_page, every_command, plain_fences, python_page
+from tests.pages import pages
+from tests.reference import TABLES, command_page, every_command, for_the_site, python_page
 
 
 def test_every_public_name_is_explained() -> None:
@@ -33,8 +34,9 @@ def test_every_command_is_there_with_its_options() -> None:
                 and not each.hidden and option not in part] == [], name  # fmt: skip
 
 
-def test_fences_of_the_site_name_a_kind_alone() -> None:
-    assert (
-        plain_fences("```console exit=2\n$ a\n```\n```yaml file=b\nc\n```\n")
-        == "```console\n$ a\n```\n```yaml\nc\n```\n"
-    )
+def test_the_site_has_tables_and_fences_that_name_a_kind_alone() -> None:
+    assert for_the_site("```console exit=2\n$ a\n```\n") == "```console\n$ a\n```\n"
+    for name in TABLES:
+        assert f"\n<!-- table: {name} -->\n" in "".join(page.read_text(encoding="utf-8") for page in pages())
+    assert "| `grubbs_alpha` | 0.05 | Probability of" in for_the_site("<!-- table: project -->")
+    assert "| P401 | **control axes exchanged or left-handed** |" in for_the_site("<!-- table: findings -->")

@@ -19,12 +19,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from photostrip.batch.evaluation import evaluate
-from photostrip.batch.outcomes import BROKEN, failure
-from photostrip.batch.parcel import pack
+from photostrip.batch.evaluation import BROKEN, Answer, Limits, Task, evaluate, failure, pack
+from photostrip.batch.folder import program
 from photostrip.batch.pool import LocalPool, Work
-from photostrip.batch.result_folder import program
-from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.errors import Fault, InputError, PhotostripError
 
 CONNECT_SECONDS = 5.0  # seconds for a scheduler to answer

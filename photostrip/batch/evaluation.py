@@ -1,30 +1,91 @@
-"""One project from its files to the texts of its result, as a worker computes it; nothing is written."""
+"""One project of a batch: what goes to a worker, how it is computed there, and what comes back.
+
+Tasks and answers are plain values that travel between processes and machines. Nothing is written here.
+"""
 
 from __future__ import annotations
 
 import tempfile
 import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memory, outcome_of
-from photostrip.batch.parcel import Parcel, unpack_grids
-from photostrip.batch.tasks import Answer, Task
-from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.foreign.exports import exported
-from photostrip.formats.text.files import LARGEST_FILE, from_disk
+from photostrip.formats.text.files import LARGEST_FILE, from_disk, read_bytes
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import Source, digest, reading_from
+from photostrip.formats.text.table_text import LARGEST_TABLE
+from photostrip.geodesy.crs import grid_names
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
-from photostrip.report.page.messages import result_findings
+from photostrip.project.reading import Node, override, path_of, read_tree
+from photostrip.report.page.messages import findings_of, line_of, result_findings
+from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, seen_at
 
 if TYPE_CHECKING:
     from photostrip.library.result import Result
     from photostrip.project.loading import Project
 
 DECIMALS = 5  # of degrees: a metre
+# How a project can end beside the verdicts of a result (good, unverified, look, failed), and the exit code of each.
+FAULTY, UNWRITTEN, WEAK = "faulty", "unwritten", "weak"
+BROKEN, TIMEOUT, MEMORY, NOT_RUN = "crashed", "timeout", "memory", "not run"
+EXIT_CODES = {
+    **{status: exit_code(status, strict=False) for status in (GOOD, UNVERIFIED, LOOK, FAILED)},
+    FAULTY: EXIT_INPUT,
+    UNWRITTEN: EXIT_INPUT,
+    WEAK: EXIT_GEOMETRY,
+    BROKEN: EXIT_INTERNAL,
+    TIMEOUT: EXIT_INTERNAL,
+    MEMORY: EXIT_INTERNAL,
+    NOT_RUN: 0,
+}
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """The files of a project."""
+
+    # content of the project file, of what it extends and of its tables, by path as the user typed it
+    files: dict[str, bytes]
+    grids: dict[str, bytes]  # content of the grid files beside the project file, by name
+    folder: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """One project to be computed."""
+
+    number: int
+    project: str  # path of the project file as the user knows it
+    overrides: tuple[str, ...] = ()
+    html: bool = False  # whether its report is wanted as a page, too
+    parcel: Parcel | None = None  # its files, when it goes to another machine; None: they are read from the disk
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of a project."""
+
+    number: int
+    outcome: Document  # its line in the summary, see ``outcome_of``
+    files: dict[str, str | bytes] = field(default_factory=dict)  # content by name; none after a failure
+    # SHA-256 of every file read, by path; None for a file that would have been read if it were there
+    inputs: dict[str, str | None] = field(default_factory=dict)
+    trace: str = ""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one project may use."""
+
+    seconds: float | None = None  # time; None: any
+    megabytes: float | None = None  # memory of the worker that computes it; None: an even share of the machine's memory
 
 
 def evaluate(task: Task) -> Answer:
@@ -89,3 +150,94 @@ def _place_of(result: Result) -> Document:
     degrees = np.degrees(frame.geodetic(frame.cartesian_from_ground(internal))[:, :2]).round(DECIMALS).tolist()
     radius = frame.ellipsoid[0] if frame.ellipsoid else 6378137.0
     return {"body": radius, "track": [degrees[n : n + 2] for n in range(0, len(degrees), 2)]}
+
+
+def outcome_of(document: Document, findings: list[Document]) -> Document:
+    """Return the line of the summary for a result with its findings.
+
+    The rms are those at check points, at control left out in turn, or at control points; ``rms_at`` says which. Points
+    that stand out are left out. ``messages`` are
+    sentences, worst first.
+    """
+    summary, status = document["summary"], document["status"]
+    role = seen_at(document)
+    return {
+        "status": status,
+        "exit_code": EXIT_CODES[status],
+        "adjustment": document["adjustment"],
+        "strips": len(document["strips"]),
+        "photos": len(document["photos"]),
+        "points": len(document["points"]),
+        "rejected": len(document["rejected"]),
+        "sigma0_um": summary["sigma0_um"],
+        "rms_at": "left-out" if role == "cross_validation" else role,
+        "rms_plan_m": headline_rms(document, role, "plan")["rms"],
+        "rms_height_m": headline_rms(document, role, "height")["rms"],
+        "messages": [document["verdict"]["verification"]] if status == UNVERIFIED else document["verdict"]["look_at"],
+        "findings": [each for each in findings if each["severity"] == "error"],
+    }
+
+
+def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
+    """Return the line of the summary for a project without a result: the keys of a result, without numbers."""
+    findings = findings_of(InputError(error) if isinstance(error, Fault) else error)
+    nothing = dict.fromkeys(
+        ("strips", "photos", "points", "rejected", "sigma0_um", "rms_at", "rms_plan_m", "rms_height_m")
+    )
+    return {
+        "status": status,
+        "exit_code": EXIT_CODES[status],
+        "adjustment": None,
+        **nothing,
+        "messages": [line_of(each).removeprefix("error: ") for each in findings],
+        "findings": findings,
+        "body": None,
+        "track": None,
+    }
+
+
+def not_run() -> Document:
+    """Return the line of the summary for a project that was not reached."""
+    return failure(NOT_RUN, InputError(()))
+
+
+def out_of_memory() -> Document:
+    """Return the line of the summary for a project that needs more memory than it may have."""
+    fix = "give more with --memory, with fewer processes (-j) if need be"
+    return failure(MEMORY, Fault("needs more memory than a worker may have", "memory", fix=fix))
+
+
+def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
+    """Read all files of a project without looking into its tables."""
+    findings, names = Findings(), list[str]()
+    with reading_from(Source()):  # a separate account: what is read now is not what a result is made from
+        root = read_tree(str(path), findings, names)
+        if root is not None:
+            root = override(root, overrides, findings)
+            names += [path_of(node, str(path)) for node in _values(root, "file")]
+        findings.stop()
+        files = {name: read_bytes(name, LARGEST_TABLE) for name in dict.fromkeys(names)}
+    if root is None:  # cannot be: read_tree() had a reason, and stop() raised it
+        raise InputError(f"{path} cannot be read")
+    grids = {name for node in _values(root, "crs") for name in grid_names(node.text)}
+    # grids elsewhere than below the project's folder must be on every machine
+    below = (name for name in sorted(grids) if not Path(name).is_absolute() and ".." not in Path(name).parts)
+    found = {name: path.parent / name for name in below if (path.parent / name).is_file()}
+    return Parcel(files, {name: from_disk(str(grid), LARGEST_FILE) for name, grid in found.items()}, str(Path.cwd()))
+
+
+def unpack_grids(parcel: Parcel, folder: Path) -> None:
+    """Write the grid files of a parcel, which PROJ reads by itself, into a folder."""
+    for name, data in parcel.grids.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+
+
+def _values(node: Node, key: str) -> Iterator[Node]:
+    """Return every text of the project that stands under a key of this name, or in a list under it."""
+    for name, inner in node.entries.items():
+        if name == key:
+            yield from (each for each in (inner, *inner.elements) if each.text)
+        yield from _values(inner, key)
+    for inner in node.elements:
+        yield from _values(inner, key)

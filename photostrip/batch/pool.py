@@ -23,9 +23,7 @@ from typing import Protocol, Self
 
 from pebble import ProcessExpired, ProcessPool
 
-from photostrip.batch.evaluation import evaluate
-from photostrip.batch.outcomes import BROKEN, MEMORY, TIMEOUT, failure, out_of_memory
-from photostrip.batch.tasks import Answer, Limits, Task
+from photostrip.batch.evaluation import BROKEN, MEMORY, TIMEOUT, Answer, Limits, Task, evaluate, failure, out_of_memory
 from photostrip.errors import Fault
 from photostrip.threads import THREAD_VARIABLES
 
@@ -194,6 +192,14 @@ def within_memory(work: Work, task: Task) -> Answer:
     if answer.outcome["status"] == MEMORY:
         os._exit(NO_MEMORY)
     return answer
+
+
+def cores() -> int:
+    """Count the cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
 
 
 def share_of_memory(workers: int) -> float:

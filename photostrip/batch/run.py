@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
+from photostrip.batch.evaluation import FAULTY, UNWRITTEN, Answer, Task, failure, not_run
+from photostrip.batch.folder import ResultFolder
 from photostrip.batch.pool import Executor, answers, do_nothing
-from photostrip.batch.result_folder import ResultFolder
 from photostrip.batch.selection import ChosenProject
-from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
 from photostrip.result.verdict import VERDICTS, exit_code

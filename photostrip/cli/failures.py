@@ -14,7 +14,7 @@ from contextvars import ContextVar
 
 import typer
 
-from photostrip.cli.stdout import ascii_only
+from photostrip.cli.output import ascii_only
 from photostrip.errors import EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.visible import visible, visible_json
 

@@ -18,21 +18,13 @@ from typing import Annotated, TextIO
 import typer
 
 from photostrip import __version__
-from photostrip.cli.commands.batch import batch
-from photostrip.cli.commands.check import check
-from photostrip.cli.commands.compare import compare
-from photostrip.cli.commands.convert import convert
-from photostrip.cli.commands.info import info, sources
-from photostrip.cli.commands.init import init
-from photostrip.cli.commands.plan import plan
-from photostrip.cli.commands.report import report
-from photostrip.cli.commands.run import run
-from photostrip.cli.commands.schema import schema
-from photostrip.cli.commands.simulate import simulate
-from photostrip.cli.commands.statement import statement
-from photostrip.cli.commands.step import step
-from photostrip.cli.commands.terrestrial import terrestrial
+from photostrip.cli.about import info, schema
+from photostrip.cli.batch import batch
+from photostrip.cli.convert import convert
 from photostrip.cli.failures import DEBUG, exit_code_of
+from photostrip.cli.projects import check, init, run, simulate
+from photostrip.cli.results import compare, report, statement
+from photostrip.cli.sheets import plan, sources, step, terrestrial
 from photostrip.errors import EXIT_INPUT
 
 Command = Callable[..., int | None]

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from photostrip.cli.stdout import Format
 from photostrip.report.sections.accuracy_report import SectionName
+
+Format = Literal["text", "json", "md", "github"]
+StatementFormat = Literal["text", "json", "md"]
+BatchFormat = Literal["text", "csv", "json", "junit", "md", "github"]
+CompareFormat = Literal["text", "json", "md", "junit", "github"]
+SheetFormat = Literal["text", "md", "json", "csv"]
+FILE_FORMS = {".txt": "text", ".md": "md", ".html": "html", ".json": "json"}  # of a report, by the ending of its file
+SHEET_FORMS = FILE_FORMS | {".csv": "csv"}
 
 
 def _keys(incomplete: str) -> list[str]:
@@ -28,22 +35,9 @@ def _page(width: int | None) -> int | None:
     return width
 
 
-Saved = Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")]
-Target = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
-]
-Rule = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")]
-RuleOfOutput = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make; needs -o.")]
-Assignments = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Override a key of the project file; may be repeated.",
-        autocompletion=_keys,
-    ),
-]
-Shape = Annotated[Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed.")]
+FORMAT = typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed.")
+Shape = Annotated[Format, FORMAT]
+Printed = Annotated[SheetFormat, typer.Option("--format", help="How the answer is printed.")]
 Width = Annotated[
     int | None,
     typer.Option(
@@ -56,18 +50,13 @@ Width = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Print the verdict only.")]
 Silent = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Say nothing but errors.")]
-Plots = Annotated[
-    Path | None, typer.Option("--plots", metavar="DIR", help="Write the pictures of the report into DIR, as SVG.")
-]
-Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 unless the verdict is GOOD.")]
 Verbose = Annotated[
     bool,
     typer.Option(
         "--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print whole tables, and say what is being done."
     ),
 ]
-
-
+Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 unless the verdict is GOOD.")]
 Sections = Annotated[
     list[SectionName] | None,
     typer.Option(
@@ -76,18 +65,57 @@ Sections = Annotated[
         help=f"Print this section, with whole tables; may be repeated. NAME: {', '.join(SectionName)}.",
     ),
 ]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override a key of the project file; may be repeated.",
+        autocompletion=_keys,
+    ),
+]
+Assigned = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Set a key of the file; may be repeated."),
+]
+Saved = Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")]
+Folder = Annotated[Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder to write into.")]
+Target = Annotated[
+    Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
+]
+Written = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o", metavar="FILE", help=f"Write it: {', '.join(SHEET_FORMS)}, or a picture where it has one."
+    ),
+]
+Rule = Annotated[Path | None, typer.Option("--depfile", metavar="FILE", help="Write a rule for make; needs -o.")]
+Plots = Annotated[
+    Path | None, typer.Option("--plots", metavar="DIR", help="Write the pictures of the report into DIR, as SVG.")
+]
+
+
+def refuse(option: str, message: str) -> NoReturn:
+    """Refuse an option as wrong usage, before anything is computed."""
+    raise typer.BadParameter(message, param_hint=option)
 
 
 def require_target(depfile: Path | None, output: Path | None) -> None:
     """Refuse a rule for make without a file to make."""
     if depfile is not None and output is None:
-        message = "a rule for make needs a target: give --output as well"
-        raise typer.BadParameter(message, param_hint="--depfile")
+        refuse("--depfile", "a rule for make needs a target: give --output as well")
 
 
 def refuse_sections(names: Sequence[SectionName] | None, answer: str) -> None:
     """Refuse sections where the answer (a format, or what it is) has none."""
     if names and answer not in {"text", "md"}:
-        raise typer.BadParameter(
-            f"only a report as text or Markdown has sections, not {answer}", param_hint="--section"
-        )
+        refuse("--section", f"only a report as text or Markdown has sections, not {answer}")
+
+
+def form_of(path: Path, option: str, forms: Mapping[str, str] = FILE_FORMS) -> str:
+    """Return the form that the ending of a file name asks for; text for a name without one."""
+    ending = path.suffix.lower()
+    if ending not in {*forms, ""}:
+        rather = ", or give --format" if option == "--output" else ""
+        refuse(option, f"nothing is written as '{path.suffix}': the name may end in {', '.join(forms)}{rather}")
+    return forms.get(ending, "text")

@@ -1,82 +1,126 @@
-"""Sheets on the command line: the options that all of them have, printed in the form asked for, written by ending."""
+"""Sheets: plans, single steps of the method, computations of a phototheodolite, what the sources print."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import require_target
-from photostrip.cli.stdout import ascii_only, print_sections
-from photostrip.visible import visible
+from photostrip.cli.failures import failures_as
+from photostrip.cli.options import Assigned, Printed, Rule, Silent, Written
+from photostrip.cli.output import Messages, check_target, deliver, write_rule
+from photostrip.planning import PlanKind
+from photostrip.strip import StepName
+from photostrip.terrestrial import TerrestrialKind
 
-if TYPE_CHECKING:
-    from photostrip.notes import Note
-    from photostrip.sheets.sheet import Sheet
-
-Form = Literal["text", "md", "json", "csv"]
-FORMS = {".json": "json", ".csv": "csv", ".md": "md", ".txt": "text", ".html": "html"}  # by the ending of a file
-PICTURE = ".svg"
-
-Printed = Annotated[Form, typer.Option("--format", help="How the answer is printed.")]
-Assigned = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Set a key of the file, as in end_lap_percent=70; may be repeated."
-    ),
-]
-Written = Annotated[
+Keys = Annotated[
     Path | None,
-    typer.Option(
-        "--output", "-o", metavar="FILE", help=f"Write it: {', '.join(FORMS)}, or a picture where it has one."
-    ),
+    typer.Argument(metavar="FILE", help="Keys (YAML); without one those that are set say all.", show_default=False),
 ]
 
 
-def check_target(output: Path | None, depfile: Path | None = None, *, picture: bool = False) -> bool:
-    """Refuse what cannot be written before anything is computed; return whether a picture is wanted."""
-    require_target(depfile, output)
-    if output is None or output.suffix.lower() in FORMS:
-        return False
-    if picture and output.suffix.lower() == PICTURE:
-        return True
-    known = ", ".join([*FORMS, PICTURE] if picture else FORMS)
-    raise typer.BadParameter(f"nothing is written as '{output.suffix}': the name may end in {known}", param_hint="-o")
-
-
-def deliver(
-    sheet: Sheet, form: str, output: Path | None = None, *, quiet: bool = False, width: int | None = None
+def plan(
+    *,
+    kind: Annotated[PlanKind, typer.Argument(metavar="KIND", help="What is planned.", show_default=False)],
+    file: Keys = None,
+    assignments: Assigned = None,
+    form: Printed = "text",
+    output: Written = None,
+    depfile: Rule = None,
+    quiet: Silent = False,
 ) -> None:
-    """Write a sheet where a file is named; print it."""
-    if output is not None and output.suffix.lower() in FORMS:
-        from photostrip.formats.text.writing import write_text
+    """Compute expected accuracy: of one model, of a strip and its control, of displacements; compare cameras.
 
-        write_text(output, sheet.rendered(FORMS[output.suffix.lower()]))
-    if output is not None and quiet:
-        return
-    if form == "json":
-        from photostrip.formats.output.result_json import to_json
+    model: errors all over it, and what each source of errors does alone. strip: along it, for layouts of control and
+    methods of adjustment. camera: by the efficiency coefficient K = f m_p, the smaller, the fewer photos.
+    displacement: how well it will be known, and the smallest that will be found. screening: the published experiment
+    with gross errors in pairs, or one of your own. `photostrip schema --plan KIND` lists the keys.
+    """
+    with failures_as(form):
+        from photostrip.library.plan import planned
+        from photostrip.report.pictures.plan_strip import strip_plan_picture
 
-        sys.stdout.write(to_json(sheet.document(), ascii_only=ascii_only()))
-    elif form == "csv":
-        sys.stdout.write(visible(sheet.csv()))
-    else:
-        print_sections(sheet.title, sheet.sections(), width, markdown=form == "md")
-
-
-def say(notes: Iterable[Note], *, quiet: bool) -> None:
-    """Say on stderr what a computation had to say beside its numbers."""
-    if not quiet:
-        for note in notes:
-            typer.echo(f"{note.severity}: {note.message}", err=True)
+        check_target(output, depfile, picture=kind == "strip")
+        found = planned(kind, file, assignments or [])
+        draw = strip_plan_picture if kind == "strip" else None
+        deliver(found.sheet, form, output, quiet=quiet, draw=draw)
+        write_rule(depfile, output, found.files)
 
 
-def write_rule(depfile: Path | None, target: Path | None, files: Iterable[str]) -> None:
-    """Write the rule for make, if one is asked for."""
-    if depfile is not None and target is not None:
-        from photostrip.formats.text.writing import make_rule, write_text
+def terrestrial(
+    *,
+    kind: Annotated[TerrestrialKind, typer.Argument(metavar="KIND", help="What is computed.", show_default=False)],
+    file: Keys = None,
+    assignments: Assigned = None,
+    form: Printed = "text",
+    output: Written = None,
+    depfile: Rule = None,
+    quiet: Silent = False,
+) -> None:
+    """Compute directions of a phototheodolite, and displacements between epochs.
 
-        write_text(depfile, make_rule(str(target), files))
+    directions: of image points; photo: where directions meet the photo; accuracy: with which directions must be
+    measured, all over the photo; theodolite: which image accuracy one can vouch for; orientation: of a photo, by
+    directions to points in it. displacement: of points between epochs, from photos of two stations; one-station: from
+    one, with known distances. cameras: those that can be named. `photostrip schema --terrestrial KIND` lists the keys.
+    """
+    with failures_as(form):
+        from photostrip.library.terrestrial import terrestrial as computed
+        from photostrip.report.pictures.displacements import displacement_picture
+
+        moved = kind == "displacement"
+        check_target(output, depfile, picture=moved)
+        found = computed(kind, file, assignments or [])
+        for note in found.notes if form == "csv" or not moved else ():  # the sheet of displacements has its notes
+            Messages(quiet=quiet).say(f"{note.severity}: {note.message}")
+        deliver(found.sheet, form, output, quiet=quiet, draw=displacement_picture if moved else None)
+        write_rule(depfile, output, found.files)
+
+
+def step(
+    *,
+    name: Annotated[StepName, typer.Argument(metavar="NAME", help="Which step.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Table of points (CSV).", show_default=False)],
+    assignments: Assigned = None,
+    trace: Annotated[
+        bool, typer.Option("--trace", help="The equations with their numbers, too: every iteration, every point.")
+    ] = False,
+    form: Printed = "text",
+    output: Written = None,
+    quiet: Silent = False,
+) -> None:
+    """Take one step of the method alone, from a table of points; image coordinates in mm.
+
+    `photostrip schema --step NAME` lists its keys: principal_distance, base, unit, sigma_um and others.
+
+    \b
+    Columns of FILE:
+      interior      mark, x, y, x_photo, y_photo
+      refine        point, x, y
+      relative      point, x_left, y_left, x_right, y_right
+      intersection  the same
+      chain         photo, omega, phi, kappa (degrees)
+      scale         point, x, y, z, x_next, y_next, z_next
+      strip         photo, point, x, y
+      absolute      point, x, y, z, x_ground, y_ground, z_ground
+      polynomial    point, x, y, z, misclosure
+      resection     point, x, y, x_ground, y_ground, z_ground
+      bundle        photo, point, x, y
+    """  # noqa: D301 (the sign by which a paragraph keeps its lines)
+    with failures_as(form):
+        from photostrip.library.step import step as computed
+
+        check_target(output)
+        deliver(computed(name, str(file), assignments or [], trace=trace), form, output, quiet=quiet)
+
+
+def sources(form: Printed = "text") -> None:
+    """Compute every worked number of the sources again.
+
+    Lists every misprint, and the command and the function for every equation.
+    """
+    with failures_as(form):
+        from photostrip.sheets.sources import sources_sheet
+
+        deliver(sources_sheet(), form)

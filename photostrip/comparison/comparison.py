@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.comparison.ground import difference_in_plan_and_height, plan_and_height
 from photostrip.comparison.members import members_of, missing_and_new
 from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
 from photostrip.result.description import LEFT_OUT
+from photostrip.result.distances import difference_in_plan_and_height, plan_and_height
 from photostrip.result.quantities import MATRIX
 from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 from photostrip.result.table import Table

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.comparison.ground import east_north_up, level, plan_and_height
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
 from photostrip.result.description import block_at
+from photostrip.result.distances import east_north_up, level, plan_and_height
 from photostrip.result.quantities import MATRIX
 from photostrip.result.reading import read
 from photostrip.result.statement.edited import OF_VALUES, faults_of_edited

@@ -24,7 +24,7 @@ from photostrip.network.observations import AFFINE, POINT, PRINCIPAL_DISTANCE, K
 from photostrip.network.problem import CALIBRATION, BundleCameras
 from photostrip.notes import Document
 from photostrip.result.quantities import MATRIX
-from photostrip.strip import lens_distortion
+from photostrip.strip.corrections import distortion_reach, image_from_ideal
 from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
 WHOLE = 1e-6  # of a pixel, up to which rounding may make a photo larger
@@ -336,11 +336,11 @@ def _in_file(camera: Camera, values: Floats, edge: Floats) -> FileCamera:
     x, y = (np.linspace(-each, each, GRID) for each in reach)
     given = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     if lens is not None:
-        given = given[np.linalg.norm(given, axis=1) < lens_distortion.reach(lens)[1]]
+        given = given[np.linalg.norm(given, axis=1) < distortion_reach(lens)[1]]
     cameras = BundleCameras(np.zeros(1, np.intp), np.array([camera.principal_distance]), distortion=(lens,))
     ideal = corrected(cameras, values[None], given, np.zeros(len(given), np.intp))
     ideal /= camera.principal_distance + values[PRINCIPAL_DISTANCE]
-    image = (given if lens is None else lens_distortion.image_from_ideal(given, lens)) + camera.principal_point
+    image = (given if lens is None else image_from_ideal(given, lens)) + camera.principal_point
     nearest = _nearest(camera, ideal, image, stretched=bool(values[AFFINE].any() or (lens and any(lens.b))))
     own, pixels = nearest if values.any() else camera, in_pixels(nearest, "colmap", size)
     found = FileCamera(own=own, nearest=nearest, pixels=pixels, departure=0.0)

@@ -15,7 +15,7 @@ from photostrip.foreign.tables import ForeignBlock
 from photostrip.formats.text.files import refuse
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
 from photostrip.notes import counted, listed
-from photostrip.strip import lens_distortion
+from photostrip.strip import corrections
 from photostrip.strip.pixel_cameras import PixelCamera, in_millimetres
 
 
@@ -48,7 +48,7 @@ def checked_camera(place: Place, name: str, given: PixelCamera) -> PixelCamera:
     if not (np.abs([*given.principal_point, *given.distortion.values()]) < LARGEST_NUMBER).all():
         raise place.wrong("a parameter is no number", "number")
     try:
-        faults = lens_distortion.faults(in_millimetres(name, given))
+        faults = corrections.distortion_faults(in_millimetres(name, given))
     except InputError as error:
         faults = list(error.faults)
     for fault in faults:

@@ -18,7 +18,7 @@ from photostrip.notes import counted
 from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
 from photostrip.project.resolved import yaml_text
 from photostrip.project.sections import Text
-from photostrip.strip.lens_distortion import shift
+from photostrip.strip.corrections import distortion_shift
 from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
 
 PIECE = 100_000  # rows that are written at a time
@@ -239,7 +239,7 @@ def _of_camera(name: str, given: PixelCamera | Camera) -> str:
     if camera.distortion is None:
         return f"{said}, no distortion"
     corner = np.array([[width / 2.0, height / 2.0]]) * size
-    moved = float(np.linalg.norm(shift(corner, camera.distortion))) / size
+    moved = float(np.linalg.norm(distortion_shift(corner, camera.distortion))) / size
     return f"{said}, distortion {moved:.1f} px in a corner"
 
 

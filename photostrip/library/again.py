@@ -14,7 +14,7 @@ from photostrip.formats.text.files import from_disk
 from photostrip.formats.text.source import Source, digest, reading_from, seen_from
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
-from photostrip.project.yaml.tree import LARGEST_PROJECT
+from photostrip.project.reading import LARGEST_PROJECT
 from photostrip.result.statement.edited import is_edited
 
 

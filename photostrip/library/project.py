@@ -190,7 +190,7 @@ def _place_of(
 def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
     """Return overrides as assignments to keys: ``processing.adjustment="bundle"``."""
     from photostrip.project.in_memory import text_of
-    from photostrip.project.yaml.tree import OVERRIDE, Override
+    from photostrip.project.reading import OVERRIDE, Override
 
     found: list[str] = []
     for key, value in overrides.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.formats.text.writing import Content
     from photostrip.library.table import Table
     from photostrip.pipeline.results import Result as Computed
+    from photostrip.report.page.parts import Section
     from photostrip.report.pictures.svg import Picture
 
 ReportForm = Literal["text", "md", "html", "json"]
@@ -40,7 +41,9 @@ class Result:
         read: Sequence[str | PathLike[str]] = (),
         exports: Sequence[str] = (),
     ) -> None:
-        self.document: Document = document if not isinstance(document.get("points"), dict) else _checked(document)
+        self.document: Document = (
+            document if not isinstance(document.get("points"), dict) else checked(document, "the result")
+        )
         """The content of result.json: blocks of keys, and tables; ``document["points"]["x"]`` is an array."""
         self._read = read
         self.computed = computed
@@ -100,13 +103,8 @@ class Result:
 
     @cached_property
     def residuals(self) -> Table:
-        """Image residuals under the final orientations, a row for each ray."""
+        """Image residuals under the final orientations, a row for each ray; y parallaxes of the pairs."""
         return self._table("residuals")
-
-    @cached_property
-    def parallaxes(self) -> Table:
-        """Residual y parallaxes, a row for each point of each pair."""
-        return self._table("parallaxes")
 
     @cached_property
     def rejected(self) -> Table:
@@ -183,19 +181,15 @@ class Result:
         from photostrip.result.statement.edited import as_reported, faults_of_edited
 
         _require_form(form, get_args(ReportForm))
-        if form == "json":
-            from photostrip.formats.output.result_json import to_json
-
-            return to_json(self.document)
         if unknown := sorted(set(sections) - set(SectionName)):
             message = f"the report has no section {', '.join(unknown)}"
             raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
-        if self.computed is not None:
-            return _rendered(self.document, form, sections, everything=everything)
+        if self.computed is not None or form == "json":
+            return report_of(self.document, form, names=sections, everything=everything)
         with faults_of_edited("reported", (self.document, self.name)):
             document = as_reported(self.document, self.name)
             sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
-            return _rendered(document, form, sections, everything=everything)
+            return report_of(document, form, names=sections, everything=everything)
 
     def statement(
         self,
@@ -295,23 +289,51 @@ class Result:
         return verdict + table
 
 
-def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, everything: bool) -> str:
-    if form == "html":
-        from photostrip.report.html import to_html
-
-        return to_html(document)
-    from photostrip.report.page import layout
+def report_sections(
+    document: Document,
+    *,
+    names: Sequence[str] = (),
+    quiet: bool = False,
+    everything: bool = False,
+    width: int | None = None,
+) -> tuple[str, Sequence[Section]]:
+    """Return title and sections of the report; the title stands over whole reports only."""
+    from photostrip.report.page.layout import USUAL
     from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
 
-    names = [SectionName(each) for each in sections]
-    chosen = chosen_sections(document, names=names, everything=everything, width=layout.USUAL)
-    title = "" if sections else title_of(document)
-    return layout.to_markdown(title, chosen) if form == "md" else layout.to_text(title, chosen, layout.USUAL)
+    chosen = [SectionName(each) for each in names]
+    sections = chosen_sections(document, quiet=quiet, everything=everything, names=chosen, width=width or USUAL)
+    return "" if quiet or names else title_of(document), sections
 
 
-def _checked(document: Document) -> Document:
+def report_of(
+    document: Document,
+    form: str,
+    *,
+    width: int | None = None,
+    ascii_only: bool = False,
+    **parts: Any,  # noqa: ANN401 (of report_sections)
+) -> str:
+    """Return the report as text, Markdown, HTML, JSON (the document) or annotations of GitHub."""
+    match form:
+        case "json":
+            from photostrip.formats.output.result_json import to_json
 
-    return checked(document, "the result")
+            return to_json(document, ascii_only=ascii_only)
+        case "html":
+            from photostrip.report.html import to_html
+
+            return to_html(document)
+        case "github":
+            from photostrip.report.page.messages import annotated, result_findings
+
+            return annotated(result_findings(document))
+    from photostrip.report.page import layout
+
+    title, sections = report_sections(document, width=width, **parts)
+    if form == "md":
+        return layout.to_markdown(title, sections, ascii_only=ascii_only)
+    return layout.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
 
 
 def _require_form(form: str, known: Sequence[str]) -> None:

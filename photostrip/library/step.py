@@ -21,20 +21,19 @@ from photostrip.camera import Camera, Distortion
 from photostrip.formats.measured.steps import read_rays, read_step
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
 from photostrip.library import steps
-from photostrip.library.step_arguments import Rays, of_rays, sigma0_of
-from photostrip.library.steps import Bundle, Strip, one_pair
-from photostrip.project import steps as keys
+from photostrip.library.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
+from photostrip.project import plans as keys
+from photostrip.project.reading import read_keys
 from photostrip.project.sections import Section
-from photostrip.project.yaml.reading import read_keys
 from photostrip.report.page.parts import DASH, Facts
 from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
 from photostrip.sheets.sheet import Rows, Sheet, by_columns
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
-from photostrip.strip.intersection import lies_across
-from photostrip.strip.polynomial_terms import columns as design_columns
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.formed_strip import lies_across
+from photostrip.strip.polynomial import term_columns as design_columns
+from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, approximate, project, resect
 from photostrip.units import MICROMETRES
 

@@ -10,8 +10,8 @@ from photostrip.notes import Note
 from photostrip.terrestrial import TerrestrialKind
 
 if TYPE_CHECKING:
-    from photostrip.project.directions import AccuracyFile, TheodoliteFile
-    from photostrip.project.yaml.reading import Reading
+    from photostrip.project.reading import Reading
+    from photostrip.project.terrestrial import AccuracyFile, TheodoliteFile
     from photostrip.sheets.directions import Grid
     from photostrip.sheets.sheet import Sheet
     from photostrip.terrestrial.normal_case import Phototheodolite
@@ -27,9 +27,9 @@ class Computed(NamedTuple):
 
 def terrestrial(kind: TerrestrialKind, path: Path | None, assignments: Sequence[str]) -> Computed:
     """Compute what a file asks for, or the keys that are set alone."""
-    from photostrip.project import directions as keys
-    from photostrip.project.phototheodolites import known_presets, only_camera
-    from photostrip.project.yaml.reading import read_keys
+    from photostrip.project import terrestrial as keys
+    from photostrip.project.reading import read_keys
+    from photostrip.project.terrestrial import known_presets, only_camera
     from photostrip.sheets import directions as sheets
 
     match kind:
@@ -56,7 +56,7 @@ def terrestrial(kind: TerrestrialKind, path: Path | None, assignments: Sequence[
             needed, reading = read_keys(keys.AccuracyFile, path, assignments)
             camera, grid = _over_photo(needed, reading)
             sigma_mm, printed = needed.sigma_um / 1000, needed.as_printed
-            sheet = sheets.accuracy_sheet(camera, needed.attitude, sigma_mm, grid, as_printed=printed)
+            sheet = sheets.accuracy_sheet(camera, needed.ends, sigma_mm, grid, keys.THEODOLITES, as_printed=printed)
         case "theodolite":
             vouched, reading = read_keys(keys.TheodoliteFile, path, assignments)
             camera, grid = _over_photo(vouched, reading)
@@ -69,8 +69,7 @@ def terrestrial(kind: TerrestrialKind, path: Path | None, assignments: Sequence[
 
 def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple[Phototheodolite, Grid]:
     """Return the camera, and the grid of a table over its photo."""
-    from photostrip.project.directions import MOST_POINTS
-    from photostrip.project.phototheodolites import only_camera
+    from photostrip.project.terrestrial import MOST_POINTS, AccuracyFile, only_camera
     from photostrip.terrestrial.accuracy import grid
 
     camera = only_camera(given.camera, reading, whole=True)
@@ -79,14 +78,14 @@ def _over_photo(given: AccuracyFile | TheodoliteFile, reading: Reading) -> tuple
         message = f"a step of {given.step:g} mm gives more than {MOST_POINTS} points"
         reading.refuse(("step",), message, "range", expected="a larger step")
         reading.findings.stop()
-    return camera, grid((width, height), given.step, level=given.level)
+    return camera, grid(
+        (width, height), given.step, level=given.both_level if isinstance(given, AccuracyFile) else given.level
+    )
 
 
 def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:
-    from photostrip.project.directions import OrientationFile
-    from photostrip.project.phototheodolites import only_camera
-    from photostrip.project.terrestrial_tables import SightingUnits, read_sightings
-    from photostrip.project.yaml.reading import read_keys
+    from photostrip.project.reading import read_keys
+    from photostrip.project.terrestrial import OrientationFile, SightingUnits, only_camera, read_sightings
     from photostrip.sheets.directions import orientation_sheet
     from photostrip.terrestrial.orientation import orient
 
@@ -101,10 +100,8 @@ def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, 
 
 
 def _one_station(path: Path | None, assignments: Sequence[str]) -> Computed:
-    from photostrip.project.directions import OneStationFile
-    from photostrip.project.phototheodolites import only_camera
-    from photostrip.project.terrestrial_tables import read_one_station
-    from photostrip.project.yaml.reading import read_keys
+    from photostrip.project.reading import read_keys
+    from photostrip.project.terrestrial import OneStationFile, only_camera, read_one_station
     from photostrip.sheets.displacements import one_station_sheet
     from photostrip.terrestrial.camera_motion import one_station
 
@@ -120,7 +117,7 @@ def _one_station(path: Path | None, assignments: Sequence[str]) -> Computed:
 
 
 def _displacement(path: Path | None, assignments: Sequence[str]) -> Computed:
-    from photostrip.project.survey import load_survey
+    from photostrip.project.terrestrial import load_survey
     from photostrip.sheets.displacements import displacement_sheet
     from photostrip.terrestrial.monitoring import monitor
 

@@ -34,7 +34,7 @@ from photostrip.network.problem import (
     Parameters,
     PositionObservations,
 )
-from photostrip.strip import lens_distortion
+from photostrip.strip.corrections import distortion_jacobian, distortion_shift
 
 PRINCIPAL_DISTANCE = list(CALIBRATION).index("c")
 STEPS_TO_IMAGE = 2  # a misfit is small, and each step leaves the square of what was left
@@ -96,7 +96,7 @@ def uncorrected(
 def _slope(own: Floats, xy: Floats) -> Floats:
     """Differentiate the image coordinates that values (10,) of parameters correct by what is corrected: (n, 2, 2)."""
     estimated = Distortion("brown", "image_to_ideal", k=tuple(own[K]), p=tuple(own[P]), b=tuple(own[AFFINE]))
-    return lens_distortion.jacobian(xy - own[POINT], estimated)
+    return distortion_jacobian(xy - own[POINT], estimated)
 
 
 def by_image(cameras: BundleCameras, camera: int, xy: Floats, center: Floats) -> Floats:
@@ -107,12 +107,12 @@ def by_image(cameras: BundleCameras, camera: int, xy: Floats, center: Floats) ->
     given = cameras.distortion[camera] if cameras.distortion else None
     if given is None:
         return np.broadcast_to(np.eye(2), (len(xy), 2, 2))
-    slope = lens_distortion.jacobian(xy, given)
+    slope = distortion_jacobian(xy, given)
     if given.direction == "image_to_ideal":
-        image = xy - np.linalg.solve(slope, lens_distortion.shift(xy, given)[..., None])[..., 0]
-        return lens_distortion.jacobian(image - center, given)
+        image = xy - np.linalg.solve(slope, distortion_shift(xy, given)[..., None])[..., 0]
+        return distortion_jacobian(image - center, given)
     moved = xy - np.linalg.solve(slope, np.broadcast_to(center, xy.shape)[..., None])[..., 0]
-    return np.asarray(np.linalg.inv(lens_distortion.jacobian(moved, given)), float)
+    return np.asarray(np.linalg.inv(distortion_jacobian(moved, given)), float)
 
 
 def partials(cameras: BundleCameras, values: Floats, camera: int, xy: Floats, ratio: Floats) -> Floats:

@@ -20,7 +20,6 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.network import adjustment, defects, hypotheses, reliability
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
-from photostrip.network.cofactors import JointCofactors, cofactors_of
 from photostrip.network.defects import is_free
 from photostrip.network.hypotheses import (
     DRIFT,
@@ -34,7 +33,7 @@ from photostrip.network.hypotheses import (
     Likely,
 )
 from photostrip.network.problem import BundleProblem, BundleSettings, PositionObservations
-from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
+from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, JointCofactors, Limit, cofactors_of
 from photostrip.network.testing import (
     ROBUST,
     START,
@@ -46,8 +45,8 @@ from photostrip.network.testing import (
     decide_rays,
 )
 from photostrip.rejection import Rejection
-from photostrip.strip.control_search import LARGEST_SHARE
-from photostrip.strip.pair_search import AMPLE, OUT_TO_ONE_MORE
+from photostrip.strip.control_screening import LARGEST_SHARE
+from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on

@@ -26,15 +26,13 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.adjustment import BundleSolution, Selection
-from photostrip.network.cofactors import JointCofactors
 from photostrip.network.observations import in_models
 from photostrip.network.problem import BundleProblem, ModelObservations
-from photostrip.network.reliability import IMAGE, Limit, image_shift
+from photostrip.network.reliability import IMAGE, JointCofactors, Limit, image_shift
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY, Rejection
 from photostrip.statistics import chi2_quantile
-from photostrip.strip.pair_search import LARGEST_SET, LIKELIER, subsets
-from photostrip.strip.ray_intersection import two_that_meet
-from photostrip.strip.resection import KnownPhotos, derivatives, project
+from photostrip.strip.pair_screening import LARGEST_SET, LIKELIER, subsets
+from photostrip.strip.resection import KnownPhotos, derivatives, project, two_that_meet
 
 RAYS_AT_ONCE = 2048  # of points that are decided on together, for the sake of memory; it changes no result
 TWO = 2  # rays

@@ -1,6 +1,10 @@
 """Ground frames of everything that is given, tied to one Cartesian frame.
 
 Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
+
+Measured image coordinates brought to the principal point and freed of what bends rays.
+
+Source: [001] for interior orientation and corrections, see docs/image-coordinates.md.
 """
 
 from __future__ import annotations
@@ -19,9 +23,12 @@ from photostrip.geodesy.local_frame import curvature_correction
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import AUTO, Inputs, Settings, refuse_curvature_twice
+from photostrip.pipeline.results import StripResult
+from photostrip.points import PhotoPoints
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.results import StripResult
+    from photostrip.strip.interior import InteriorOrientation
+
 
 LEFT_BY_A_LEVEL_FIT = 2.0 / (3.0 * 5.0**0.5)  # rms of what a parabola leaves about its mean, of its height at the ends
 EPOCH_UNKNOWN = 10.0  # years by which an epoch that is not given may differ from that of an operation
@@ -165,3 +172,21 @@ def _left_out(inputs: Inputs, settings: Settings, strips: Sequence[StripResult])
             "`earth_curvature: model` takes it into account, `earth_curvature: none` says that there is none"
         )
         yield Note("curvature-left-out", text, severity="note", key="processing.earth_curvature")
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoCoordinates:
+    """Image points in the system of the photo."""
+
+    observations: PhotoPoints
+    interior: InteriorOrientation | None  # None where no fiducial marks were measured
+
+
+def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
+    """Interior orientation, when fiducial marks were measured."""
+    if inputs.fiducials is None:
+        return PhotoCoordinates(inputs.observations, None)
+    from photostrip.strip import interior
+
+    orientation = interior.orient(inputs.fiducials, inputs.cameras, settings.interior)
+    return PhotoCoordinates(interior.transform(inputs.observations, orientation), orientation)

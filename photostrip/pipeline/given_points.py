@@ -6,7 +6,6 @@ Whether the control checks itself: how large an error of a given coordinate woul
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +13,8 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import reliability
 from photostrip.notes import Note
-from photostrip.pipeline.results import AdjustedStrips, Bundle, StripResult
+from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Result, StripResult
 from photostrip.points import ControlPoints, PhotoPoints, locate, located
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.results import Adjusted, Result
 
 
 def measured_control(control: ControlPoints, observations: PhotoPoints) -> ControlPoints:

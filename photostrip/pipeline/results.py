@@ -11,29 +11,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, pieces
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.local_frame import IntermediateFrame
+from photostrip.network import reliability
+from photostrip.network.adjustment import Selection
+from photostrip.network.problem import BundleProblem
+from photostrip.network.reliability import Correlation
+from photostrip.network.snooping import ScreenedBundle
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip import absolute_orientation as absolute
+from photostrip.strip import corrections, pair_screening
+from photostrip.strip import resection as exterior
+from photostrip.strip.control_screening import ScreenedControl
+from photostrip.strip.fitted_strip import CheckErrors
 from photostrip.strip.formed_strip import FormedStrip
+from photostrip.strip.linked_models import FormedModels
 from photostrip.strip.polynomial import Polynomial
-from photostrip.strip.relative_orientation.orientation import Orientation
+from photostrip.strip.relative_orientation import Orientation
 
 if TYPE_CHECKING:
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.network import reliability
-    from photostrip.network.adjustment import Selection
-    from photostrip.network.cofactors import Correlation
-    from photostrip.network.problem import BundleProblem
-    from photostrip.network.snooping import ScreenedBundle
-    from photostrip.strip import corrections, pair_screening
-    from photostrip.strip import resection as exterior
-    from photostrip.strip.control_screening import ScreenedControl
-    from photostrip.strip.fitted_strip import CheckErrors
     from photostrip.strip.interior import InteriorOrientation
-    from photostrip.strip.model_strip import FormedModels
 
 ROLES = NEW, CONTROL, CHECK = "new", "control", "check"
 

@@ -1,29 +1,135 @@
-"""The whole walk, as a table of contents: numbers are those of the method in README.md."""
+"""Control left out in turn: how far off the same adjustment is where it does not know the ground.
+
+The strips are formed and their control is searched once; what is repeated is absolute orientation, polynomials or
+bundle adjustment, and precision.
+
+The whole walk, as a table of contents: numbers are those of the method in README.md.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Finding, Note
-from photostrip.pipeline.block.adjust import adjust_block
-from photostrip.pipeline.block.datum import FormedStrips
-from photostrip.pipeline.block.start import laid_on_ground
-from photostrip.pipeline.common_points import join_photos, join_strips, not_determined
-from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
-from photostrip.pipeline.given_points import compare_with_given, measured_control, unchecked_control_notes
-from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
+from photostrip.pipeline import formed_photos, gate
+from photostrip.pipeline.block_adjustment import adjust_block
+from photostrip.pipeline.block_start import FormedStrips, laid_on_ground
+from photostrip.pipeline.formed_photos import FormedPhotos
+from photostrip.pipeline.frames import (
+    GroundFrames,
+    PhotoCoordinates,
+    TiedFrames,
+    curvature_notes,
+    datum_notes,
+    orient_interior,
+    tie_ground_frames,
+)
+from photostrip.pipeline.given_points import (
+    compare_with_given,
+    measured_control,
+    rejected_control,
+    unchecked_control_notes,
+)
 from photostrip.pipeline.inputs import AUTO, BUNDLE, POLYNOMIAL, Inputs, Settings, require_runnable, require_whole
-from photostrip.pipeline.plausibility import gate
-from photostrip.pipeline.results import AdjustedStrips, Result
-from photostrip.pipeline.strips.absolute import on_control
-from photostrip.pipeline.strips.method import adjust_formed, adjust_photos, as_single_photos, form_strips
-from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.pipeline.photos_on_control import on_control
+from photostrip.pipeline.precision import join_photos, join_strips, mean_points, not_determined
+from photostrip.pipeline.results import AdjustedStrips, Fold, Result
+from photostrip.pipeline.strip_method import adjust_formed, adjust_photos, as_single_photos, form_photos, form_strips
 from photostrip.points import PhotoPoints
+from photostrip.strip import corrections
+
+FOLDS = 10  # adjustments that are made at most
+
+
+def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[Fold, ...]:
+    """Adjust again without each point of the control, or without each of so many groups, and compare with it there.
+
+    adjust: adjusts the formed strips with other control.
+    """
+    control, folds = result.inputs.control, []
+    # nothing is searched again in strips: what the whole rejected stays out; a bundle leaves it out by itself
+    use = control.use & ~rejected_control(result) if result.bundle is None else control.use
+    taken = np.flatnonzero(~control.check & use.any(axis=1))
+    for group in _groups(result):
+        left_out = np.isin(np.arange(len(control)), group)
+        given = replace(control, check=left_out, use=use).take(taken)
+        ids = tuple(control.ids[row] for row in np.sort(group))
+        try:
+            folds.append(Fold(ids, adjust(replace(result.inputs, control=given))))
+        except (GeometryError, InputError, np.linalg.LinAlgError) as error:
+            folds.append(Fold(ids, None, str(error)))
+    return tuple(folds)
+
+
+def _groups(result: Result) -> list[Numbers]:
+    """Return rows of the control to be left out together: single points, or points as far apart as can be.
+
+    Control that was found wrong says nothing about the result and is not among them.
+    """
+    control = result.inputs.control
+    used = control.use.any(axis=1) & ~control.check & ~rejected_control(result).any(axis=1)
+    rows = np.flatnonzero(used & (result.control_rows >= 0))
+    if len(rows) <= FOLDS:
+        return [rows[[number]] for number in range(len(rows))]
+    place = result.points.cartesian[result.control_rows[rows]]
+    _, _, axes = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)
+    along = rows[np.argsort(place @ axes[0], kind="stable")]
+    return [along[number::FOLDS] for number in range(FOLDS)]
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Mean heights above the ellipsoid, metres, or above the plane of a local frame."""
+
+    flying: float
+    ground: float
+
+
+def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground: GroundFrames) -> corrections.Refined:
+    """Image coordinates reduced to the principal point, free of distortion and refraction.
+
+    Refraction and Earth curvature need heights; where they are not given, they are those of the strips without these
+    corrections.
+    """
+    if inputs.models is not None:  # there are none: the observations only name the points
+        return corrections.Refined(photo.observations, {})
+    wanted = settings.refinement
+    if wanted.needs_heights and (wanted.flying_height is None or wanted.ground_height is None):
+        plain = replace(wanted, refraction=False, earth_radius=None)
+        bent = corrections.refine(photo.observations, inputs.cameras, plain).observations
+        heights = heights_of(bent, inputs, settings, ground)
+        wanted = replace(wanted, flying_height=heights.flying, ground_height=heights.ground)
+    return corrections.refine(photo.observations, inputs.cameras, wanted)
+
+
+def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames) -> Heights:
+    """Mean heights of cameras and ground from the strips, adjusted as they will be, in the frames of the run."""
+    control = measured_control(inputs.control, observations)
+    formed = form_photos(inputs, observations, settings)
+    if settings.together:
+        adjusted = adjust_block(inputs, settings, observations, control, ground, formed)
+        strips, points = adjusted.strips, adjusted.points.cartesian
+        singles = () if adjusted.bundle is None else adjusted.bundle.singles
+    else:
+        strips = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
+        points, singles = mean_points(strips).xyz, ()
+    of_strips = [strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips]
+    centers = np.concatenate([*of_strips, *(single.center[None] for single in singles)])
+    frame = ground.control[0] if ground.control else ground.output
+    return Heights(float(_heights(centers, frame).mean()), float(_heights(points, frame).mean()))
+
+
+def _heights(points: Floats, frame: GroundFrame) -> Floats:
+    heights: Floats = points[:, 2] if frame.kind == "local" else frame.geodetic(points)[:, 2]
+    return heights
 
 
 def triangulate(
@@ -88,17 +194,16 @@ def _walk_of_any_order(inputs: Inputs, settings: Settings, ground: GroundFrames,
     """Walk from each of the starts that photos which are listed in no order have, until one leads to the end."""
     if all(strip.listed for strip in inputs.strips):
         return _walk_by_any_method(inputs, settings, ground, photo)
-    from photostrip.pipeline.strips import finding  # strips that are listed need none of it
 
     refused: list[GeometryError] = []
-    for start in finding.starts(inputs, photo.observations, settings):
+    for start in formed_photos.starts(inputs, photo.observations, settings):
         try:
             result = _walk_by_any_method(start.inputs, settings, ground, photo)
         except GeometryError as error:
             refused.append(error)
         else:
-            return replace(result, notes=(*finding.notes(start, refused), *result.notes))
-    raise finding.refusal(inputs, refused[0]) from refused[0]
+            return replace(result, notes=(*formed_photos.notes(start, refused), *result.notes))
+    raise formed_photos.refusal(inputs, refused[0]) from refused[0]
 
 
 def _walk_by_any_method(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:
@@ -182,7 +287,6 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     # 6 what the result says of control that it has not seen
     if not settings.cross_validation:
         return result
-    from photostrip.pipeline.cross_validation import cross_validate
 
     return replace(result, folds=cross_validate(result, partial(on_the_ground, whole=result)))
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from photostrip.camera import Distortion
-from photostrip.strip.lens_distortion import ideal_from_image
+from photostrip.strip.corrections import ideal_from_image
 from photostrip.units import MILLIMETRES
 
 KILOMETRE = 1e6  # mm

@@ -34,12 +34,29 @@ from photostrip.planning.single_model import (
     orientation_parameters,
 )
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
-from photostrip.strip.relative_orientation import standard_points
+from photostrip.strip import relative_orientation
 
 DEFORMATION_TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5
 LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is mostly luck
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
+
+
+def relative_errors(
+    image: ArrayLike, focal: float, errors: ArrayLike, *, base: float = 0.0, principal_distance: float = 0.0
+) -> Floats:
+    """Relative errors dX/X, dY/Y, dZ/Z (..., 3) of points of the normal case: X = N x, Y = N y, Z = -N f, N = B/p.
+
+    image, errors: (..., 3), x, y and x parallax p of the left photo, and their errors, mm; y and x must not be zero.
+    base: relative error of the base B.
+    principal_distance: error of f, mm.
+
+    Source: [003] eq. 10.7.
+    """
+    x, y, p = np.moveaxis(np.asarray(image, float), -1, 0)
+    dx, dy, dp = np.moveaxis(np.asarray(errors, float), -1, 0)
+    common = base - dp / p
+    return np.stack(np.broadcast_arrays(common + dx / x, common + dy / y, common + principal_distance / focal), axis=-1)
 
 
 def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float) -> Floats:
@@ -101,18 +118,20 @@ def rigorous_covariance(xy: ArrayLike, focal: float, width: float, base: float, 
     """
     place = np.asarray(xy, float)
     level = np.column_stack([place, np.full(len(place), focal)])
-    rows = influence(level, base) @ standard_points.dependent_from_base(base)
+    rows = influence(level, base) @ relative_orientation.dependent_from_base(base)
     stretch = focal / base * np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
     rows[:, :2] -= place[:, :, None] * stretch
     units = np.moveaxis(np.array([parallax_error(place, unit, focal, base) for unit in np.eye(5)]), 0, -1)
     rows[:, 2] = -focal / base * units
-    cofactors = standard_points.cofactors(focal, width, base)
+    cofactors = relative_orientation.cofactors(focal, width, base)
     return 2 * sigma**2 * rows @ cofactors @ np.swapaxes(rows, 1, 2) + measured_covariance(level, base, focal, sigma)
 
 
 def base_frame_elements(dependent: ArrayLike, base: float) -> Floats:
     """Return alpha1', kappa1', alpha2', omega2', kappa2' for dby, dbz, dkappa, dalpha, domega of the right photo."""
-    return np.asarray(np.linalg.solve(standard_points.dependent_from_base(base), np.asarray(dependent, float)), float)
+    return np.asarray(
+        np.linalg.solve(relative_orientation.dependent_from_base(base), np.asarray(dependent, float)), float
+    )
 
 
 def surface_of_elements(elements: ArrayLike, scale: float, focal: float, base: float) -> Floats:
@@ -303,6 +322,7 @@ class BentModel:
     """The surface into which errors of the elements bend a model."""
 
     surface: Floats  # (5,): E0, A, B, C, D of the heights, for x and y in mm at photo scale
+    c: Floats  # (q,): what the elements add to the x parallax, eq. 10.9, mm
     raised: Floats  # (q, 3): errors of points in the base frame, eq. 10.8: plan by the left ray, heights by the surface
     left: Floats  # (q, 3): what the absolute orientation leaves of the errors
 
@@ -316,6 +336,7 @@ def bend_model(points: Floats, control: ModelControl, base: float, focal: float,
     parts = error_parts(points, np.zeros_like(points), control, ControlErrors(none, none), base, elements)
     return BentModel(
         surface=surface_of_elements(turned, 1.0, focal, base),
+        c=c,
         raised=np.column_stack([xy / base * c[:, None], -focal / base * c]),
         left=parts.from_elements,
     )

@@ -23,17 +23,15 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity
 from photostrip.network import problem as bundle
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of as bundle_precision
+from photostrip.network.reliability import cofactors_of as bundle_precision
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
-from photostrip.strip import absolute_orientation, fitted_strip, polynomial, polynomial_terms
+from photostrip.strip import absolute_orientation, fitted_strip, polynomial
 from photostrip.strip.fitted_strip import FittedStrip
-from photostrip.strip.formed_strip import FormedStrip, form_from_pairs
+from photostrip.strip.formed_strip import FormedStrip, StripFormationSettings, form_from_pairs
 from photostrip.strip.pair_screening import DETECTABLE
-from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.scale_transfer import StripFormationSettings
+from photostrip.strip.relative_orientation import Orientation, collect_pairs, orient_pairs
 from photostrip.strip.strip_errors import StripErrors, differentiate_strip
 
 SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
@@ -344,7 +342,7 @@ def _fitted(strip: IdealStrip, numbers: Numbers, control: ControlPoints, method:
 
 def _used(terms: list[tuple[str, ...]]) -> str:
     """Say which degree the control carries; plan and height apart where they differ."""
-    powers = [polynomial_terms.degree_of(each) for each in (terms[0], terms[2])]
+    powers = [polynomial.degree_of(each) for each in (terms[0], terms[2])]
     names = ["similarity" if power == 0 else f"degree {power}" for power in powers]
     return names[0] if names[0] == names[1] else f"{names[0]} in plan, {names[1]} in height"
 

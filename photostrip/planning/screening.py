@@ -17,9 +17,14 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.rotation import from_angles
 from photostrip.strip.pair_screening import ScreenedPairs, screen_pairs
-from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-from photostrip.strip.relative_orientation.solution import linearised_parallaxes
+from photostrip.strip.relative_orientation import (
+    MINIMUM_POINTS,
+    Pairs,
+    RelativeSettings,
+    linearised_parallaxes,
+    orient_unchecked,
+    unusable_pairs,
+)
 
 ZONES = 6
 ARC_MINUTES = 60 * 180 / np.pi  # in a radian
@@ -119,6 +124,7 @@ class FoundRates(NamedTuple):
     size: float  # mm
     errors: int
     found: int
+    by_parallax: int  # of them by the residual parallax alone
 
 
 class MethodOutcome(NamedTuple):
@@ -129,7 +135,9 @@ class MethodOutcome(NamedTuple):
     parallax: float
     later: float
     missed: float
-    lost: float  # good points lost for each error
+    # good points lost for each error: beside wrong ones that were found, and instead of one that stays in its pair
+    beside: float
+    instead: float
     detection: tuple[FoundRates, ...]
     # change of the elements in pairs that kept an error, against the same pairs without errors: the largest of the
     # five, radians; mean over those pairs, and the worst; NaN where no error was missed
@@ -200,17 +208,19 @@ def _outcome(
     for number in np.unique(spec.layout.zone).tolist():
         for each in sorted(set(spec.sizes)):
             those = (zone == number) & (size == each)
-            found = int((those & out).sum())
-            detection.append(FoundRates(zone=number, size=each, errors=int(those.sum()), found=found))
+            found, early = int((those & out).sum()), int((those & out & first).sum())
+            detection.append(FoundRates(number, each, int(those.sum()), found, early))
     turned = np.concatenate([result.orientation.elements for result in results]) - elements
     change = np.abs((turned + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
-    change = change[missed.reshape(-1, spec.layout.points).any(axis=1)]
+    kept = missed.reshape(-1, spec.layout.points).any(axis=1)  # pairs that keep an error
+    change, lost = change[kept], (out & ~wrong).reshape(-1, spec.layout.points).sum(axis=1)
     return MethodOutcome(
         method=name,
         parallax=float((wrong & first & out).sum()) / total,
         later=float((wrong & out & ~first).sum()) / total,
         missed=float(missed.sum()) / total,
-        lost=float((out & ~wrong).sum()) / total,
+        beside=float(lost[~kept].sum()) / total,
+        instead=float(lost[kept].sum()) / total,
         detection=tuple(detection),
         mean_change=float(change.mean()) if len(change) else np.nan,
         worst_change=float(change.max()) if len(change) else np.nan,

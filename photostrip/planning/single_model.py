@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.notes import counted
-from photostrip.strip.relative_orientation import standard_points
+from photostrip.strip import relative_orientation
 
 ELEMENTS = ("dby", "dbz", "dkappa", "dalpha", "domega")
 FREE = ("dkappa", "dbz", "dalpha2", "domega")  # dalpha2: the turn against the base, dalpha - dbz / b
@@ -93,7 +93,7 @@ def element_covariance(points: ArrayLike, base: float, sigma: float) -> Floats:
             code="plan-orientation",
         )
     inverse = np.linalg.inv((rows / size).T @ (rows / size)) / np.outer(size, size)
-    turn = standard_points.dependent_from_base(base)
+    turn = relative_orientation.dependent_from_base(base)
     return sigma**2 * turn @ inverse @ turn.T
 
 

@@ -28,8 +28,7 @@ from photostrip.plausibility.finding import found
 from photostrip.points import ControlPoints, PhotoPoints, located
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile, t_quantile
 from photostrip.strip.formed_strip import FormedStrip
-from photostrip.strip.ray_intersection import Intersected, intersect_points, where_two_meet
-from photostrip.strip.resection import KnownPhotos, project
+from photostrip.strip.resection import Intersected, KnownPhotos, intersect_points, project, where_two_meet
 
 SAME_PLACE_SIGMAS = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_HEIGHT_FACTOR = 3.0  # times that in height, times height over base

@@ -24,14 +24,21 @@ from photostrip.formats.text.tables import Table
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted, listed
-from photostrip.pipeline import overruling
-from photostrip.pipeline.image_coordinates import orient_interior
-from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, Strip, require_whole
-from photostrip.pipeline.plausibility import gate
+from photostrip.pipeline import gate
+from photostrip.pipeline.frames import orient_interior
+from photostrip.pipeline.inputs import (
+    BUNDLE,
+    Inputs,
+    MeasuredModels,
+    Strip,
+    require_measured,
+    require_named,
+    require_whole,
+)
 from photostrip.points import PhotoPoints, locate
 from photostrip.project.loading import Project, read_project
+from photostrip.project.reading import fault_at, key_path
 from photostrip.project.tables import Tables, rays
-from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.strip import corrections
 from photostrip.units import MICROMETRES, MILLIMETRES
 
@@ -72,9 +79,9 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     except InputError as error:
         return Checked(path=str(path), faults=error.faults, findings=error.findings, notes=(), document={})
     inputs, models = project.inputs, project.inputs.models
-    faults = _refused(project, partial(overruling.require, project.settings.relative, inputs.observations))
+    faults = _refused(project, partial(require_measured, project.settings.relative, inputs.observations))
     if models is not None:
-        faults += _refused(project, partial(overruling.require_named, project.settings.links, models.points))
+        faults += _refused(project, partial(require_named, project.settings.links, models.points))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
     used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
@@ -169,7 +176,7 @@ def _neighbours(project: Project) -> list[Fault]:
 
 def _pairs(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
     """Refuse neighbouring photos with too few common points for their relative orientation."""
-    from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
+    from photostrip.strip.relative_orientation import MINIMUM_POINTS
 
     for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
         for j in np.flatnonzero(count[: len(strip.photos) - 1] < MINIMUM_POINTS).tolist():
@@ -345,7 +352,7 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
 
 def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:
     """Refuse neighbouring models that cannot be linked, and models of the other hand."""
-    from photostrip.pipeline.strips.models import form_models  # strips of photos need none of it
+    from photostrip.pipeline.strip_method import form_models
 
     for number, strip in enumerate(models.strips):
         try:

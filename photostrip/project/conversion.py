@@ -40,11 +40,11 @@ from photostrip.project.keys import (
     ProjectFile,
 )
 from photostrip.project.keys import CameraPositions as PositionsBlock
+from photostrip.project.reading import Node
 from photostrip.project.sections import Section
-from photostrip.project.yaml.tree import Node
 from photostrip.strip import fiducial_marks, formed_strip
 from photostrip.strip.fiducial_marks import Certificate
-from photostrip.strip.scale_transfer import StripFormationSettings
+from photostrip.strip.formed_strip import StripFormationSettings
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

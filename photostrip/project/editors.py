@@ -1,7 +1,9 @@
-"""JSON Schemas of the files that users write, for editors, draft 2020-12: every key, its default and its unit."""
+"""The files that users write, as JSON Schema 2020-12 and as a page: every key, its default and its unit."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, get_origin
@@ -22,9 +24,9 @@ KINDS = {  # where the keys of each kind of file stand, and its title
     "camera": ("plans", "CameraPlanFile", "photostrip plan camera"),
     "displacement": ("plans", "DisplacementPlanFile", "photostrip plan displacement"),
     "screening": ("plans", "ScreeningPlanFile", "photostrip plan screening"),
-    "terrestrial displacement": ("survey", "TerrestrialFile", "photostrip terrestrial displacement"),
+    "terrestrial displacement": ("terrestrial", "TerrestrialFile", "photostrip terrestrial displacement"),
     **{
-        f"terrestrial {kind}": ("directions", name, f"photostrip terrestrial {kind}")
+        f"terrestrial {kind}": ("terrestrial", name, f"photostrip terrestrial {kind}")
         for kind, name in {
             "directions": "DirectionsFile",
             "photo": "PhotoFile",
@@ -36,7 +38,7 @@ KINDS = {  # where the keys of each kind of file stand, and its title
         }.items()
     },
     **{
-        f"step {name}": ("steps", f"{kind}Keys", f"photostrip step {name}")
+        f"step {name}": ("plans", f"{kind}Keys", f"photostrip step {name}")
         for name, kind in {
             "interior": "Interior",
             "refine": "Refine",
@@ -67,6 +69,29 @@ def schema_of(kind: str) -> dict[str, Any]:
     found = file.model_json_schema(schema_generator=_ForEditors)
     needed = MEASURED if kind == "project" else {}
     return {"$schema": _ForEditors.schema_dialect, **found, "title": title, **needed}
+
+
+def keys_page(kind: str) -> str:
+    """Return a page of Markdown with the keys of a kind of file, a table for each section."""
+    schema, lines = schema_of(kind), []
+    for path, section in _sections(schema, schema.get("$defs", {}), ""):
+        lines += [f"### `{path}`", ""] if path else []
+        lines += [section["description"], "", "| key | default | what it says |", "|---|---|---|"]
+        for name, entry in section.get("properties", {}).items():
+            default = entry.get("default", "required" if name in section.get("required", ()) else "")
+            value = default if isinstance(default, str) else json.dumps(default, ensure_ascii=False)
+            value = "" if value in {"{}", "[]"} else value
+            lines.append(f"| `{name}` | {value} | {entry.get('description', '')} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _sections(section: dict[str, Any], parts: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Return a section and those below it, each with the keys that lead to it."""
+    yield path, section
+    for name, entry in section.get("properties", {}).items():
+        for part in dict.fromkeys(re.findall(r"#/\$defs/(\w+)", json.dumps(entry))):
+            yield from _sections(parts[part], parts, f"{path}.{name}" if path else name)
 
 
 class _ForEditors(GenerateJsonSchema):

@@ -19,11 +19,10 @@ from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.points import locate
 from photostrip.project.conversion import cameras, certificate_of
 from photostrip.project.keys import Camera, Processing, ProjectFile
-from photostrip.project.models import ModelTables
+from photostrip.project.reading import NO_FILES, Node, key_path
 from photostrip.project.resolved import OF_MODELS, OF_PHOTOS
 from photostrip.project.sections import Section
-from photostrip.project.tables import Tables, alike, rays
-from photostrip.project.yaml.tree import NO_FILES, Node, key_path
+from photostrip.project.tables import ModelTables, Tables, alike, rays
 from photostrip.strip.fiducial_marks import POOR_FIT, Certificate
 
 NEAR_NAMED = 3

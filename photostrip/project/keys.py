@@ -67,11 +67,11 @@ from photostrip.project.sections import (
 )
 from photostrip.strip import pixel_cameras
 from photostrip.strip.fiducial_marks import PLACES
-from photostrip.strip.model_links import METHODS as LINK_METHODS
+from photostrip.strip.formed_strip import INTERSECTIONS, SCALE_TRANSFERS
+from photostrip.strip.linked_models import METHODS as LINK_METHODS
 from photostrip.strip.pixel_cameras import CONVENTIONS, PIXEL_SIZE
 from photostrip.strip.polynomial import DEGREES
-from photostrip.strip.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
-from photostrip.strip.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
+from photostrip.strip.relative_orientation import SCREENINGS as RELATIVE_SCREENINGS
 
 
 def header_names(*layouts: Iterable[Column]) -> After:
@@ -765,7 +765,7 @@ ENDINGS = {
 }
 ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
-TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined", "reliability", "links")  # of a run
+TABLES = ("points", "photos", "residuals", "rejected", "refined", "reliability", "links")  # of a run
 
 
 def form_of(target: str, asked: str = "") -> str:

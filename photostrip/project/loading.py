@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Numbers
 from photostrip.camera import Camera
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.measurements import Measurements
@@ -22,7 +23,7 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.frames import TiedFrames
-from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
 from photostrip.project.conversion import with_pixel_sizes
@@ -30,16 +31,87 @@ from photostrip.project.hints import hints
 from photostrip.project.keys import Camera as CameraBlock
 from photostrip.project.keys import CameraPositions as CameraPositionsBlock
 from photostrip.project.keys import Control, GivenList, Orientations, Output, ProjectFile
-from photostrip.project.models import check_models, measured_models
-from photostrip.project.places import ListedPoints, listed_points, of_points, places_of
+from photostrip.project.reading import NO_FILES, Node, Reading, at_own_key, steps, valid_section
+from photostrip.project.references import check_references
 from photostrip.project.resolved import completed, text_of
-from photostrip.project.tables import Tables, check_tables, in_one_zone, measured_photos, read_tables
-from photostrip.project.yaml.reading import Reading, valid_section
-from photostrip.project.yaml.references import check_references
-from photostrip.project.yaml.tree import NO_FILES, Node, at_own_key
+from photostrip.project.tables import (
+    Tables,
+    check_models,
+    check_tables,
+    in_one_zone,
+    measured_models,
+    measured_photos,
+    read_tables,
+)
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
+
+
+@dataclass(frozen=True, eq=False)
+class ListedPoints:
+    """Where the points of a control list stand: all that is kept of it while a project is run."""
+
+    file: str
+    ids: Sequence[str]
+    lines: Numbers  # (n,): line of each id, counted from 1
+
+
+def listed_points(tables: Tables) -> tuple[ListedPoints, ...]:
+    """Return where the points of all control lists stand that could be read."""
+    return tuple(
+        ListedPoints(read.table.file, read.ids, read.table.lines) for read in tables.control if read is not None
+    )
+
+
+def places_of(
+    findings: Iterable[Finding], tree: Node, control: Sequence[ListedPoints], strips: Sequence[Strip | ModelStrip]
+) -> Iterator[Finding]:
+    """Return findings with the place of their key, else of the first point in a control list or photo in a strip."""
+    for each in findings:
+        if each.key:
+            path, key = steps(each.key), each.key
+        elif each.points and (row := _given(each.points, control)) is not None:
+            yield replace(each, file=row[0], line=row[1])
+            continue
+        else:
+            path = _listed(each, strips[: len(tree.list_at("strips"))])
+            path = path or (("photos",) if each.photos or each.strips else ())
+            key = ""
+        if not path or not tree.has(*path[:1]):
+            yield each
+            continue
+        place = tree.place_of(path)
+        yield replace(each, file=place.file, line=place.line, column=place.column, key=key)
+
+
+def of_points(fault: Fault, control: Sequence[ListedPoints]) -> Fault:
+    """Return a fault that knows only its points with the place of the first of them in a control list."""
+    row = _given(fault.points, control)
+    return fault if row is None else replace(fault, file=row[0], line=row[1])
+
+
+def _given(points: tuple[str, ...], control: Sequence[ListedPoints]) -> tuple[str, int] | None:
+    """File and line of the first of some points that a control list gives."""
+    for listed in control:
+        rows = np.flatnonzero(np.isin(np.array(listed.ids, str), points))
+        if len(rows):
+            return listed.file, int(listed.lines[rows[0]])
+    return None
+
+
+def _listed(finding: Finding, strips: Sequence[Strip | ModelStrip]) -> tuple[str | int, ...]:
+    """Path of the first photo, or of the strip, that a finding names."""
+    for number, strip in enumerate(strips):
+        if finding.strips and strip.id not in finding.strips:
+            continue
+        for photo in finding.photos:
+            if photo in strip.photos:
+                return ("strips", number, "photos", strip.photos.index(photo))
+        if finding.strips:
+            return ("strips", number, "id")
+    return ()
+
 
 OF_IMAGES = ("photostrip", "cameras", "strips", "photos", "observations", "fiducial_measurements", "accept")
 __all__ = ["Project", "adjust_project", "load_project", "read_project"]
@@ -115,7 +187,7 @@ class Project:
 
 def adjust_project(project: Project) -> Result:
     """Adjust a project; what is refused has its place in the project file."""
-    from photostrip.pipeline.run import triangulate  # what only reads a project does without
+    from photostrip.pipeline.run import triangulate
 
     with project.places():
         return triangulate(
@@ -228,7 +300,7 @@ def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenLis
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
     """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
-    from photostrip.pipeline.plausibility import evidence
+    from photostrip.pipeline import evidence
 
     root, measured = reading.root, tables.observations
     given = valid_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)})

@@ -1,4 +1,4 @@
-"""The files of ``photostrip plan``: keys of each kind, and the specifications of ``planning`` made of them."""
+"""The files of ``photostrip plan`` and the keys of single steps; the specifications of ``planning`` made of them."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
 from photostrip.project.conversion import distortion_of
 from photostrip.project.keys import Distortion
-from photostrip.project.phototheodolites import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
-from photostrip.project.phototheodolites import Camera as Phototheodolite
+from photostrip.project.reading import Reading, read_keys, valid_section
 from photostrip.project.sections import (
     After,
     Before,
@@ -47,9 +46,11 @@ from photostrip.project.sections import (
     wrong,
 )
 from photostrip.project.simulation import SimulatedCamera, camera_of
-from photostrip.project.yaml.reading import Reading, read_keys, valid_section
+from photostrip.project.terrestrial import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
+from photostrip.project.terrestrial import Camera as Phototheodolite
 from photostrip.simulation import Points
-from photostrip.strip.relative_orientation.orientation import SCREENINGS
+from photostrip.strip.polynomial import POWERS
+from photostrip.strip.relative_orientation import SCREENINGS
 from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
@@ -796,3 +797,84 @@ def load_screening_plan(path: Path | None, assignments: Sequence[str]) -> Screen
         seed=given.seed,
     )
     return ScreeningPlan(name=str(given.name), spec=spec, files=reading.files)
+
+
+class StepKeys(Section):
+    """A step that needs nothing but its table."""
+
+    photostrip_step: FirstSchema = key("Number of this schema: 1")
+
+
+class InteriorKeys(StepKeys):
+    """The transformation of measured fiducial marks to calibrated ones, mm."""
+
+    transform: Annotated[Words, After(one_of("conformal", "affine", "bilinear", "projective"))] = key(
+        "From measured to photo coordinates: conformal, affine, bilinear, projective", "affine"
+    )
+
+
+class FocalKeys(StepKeys):
+    """A step with photos of one camera."""
+
+    principal_distance: Positive = key("Principal distance", unit="mm")
+
+
+class RefineKeys(FocalKeys):
+    """Photo coordinates reduced to the principal point, lens distortion and refraction corrected."""
+
+    principal_point: Pair = key("Principal point", (0.0, 0.0), unit="mm")
+    k: Triple = key("Radial distortion k1, k2, k3, from image to ideal coordinates", (0.0, 0.0, 0.0))
+    flying_height: Number | None = key("Above sea level; corrects refraction", None, unit="m")
+    ground_height: Number = key("Of the terrain, above sea level", 0.0, unit="m")
+
+
+class RelativeKeys(FocalKeys):
+    """Two photos oriented relative to each other, and their model."""
+
+    base: Positive = key("Length of the first base", 100.0, unit="unit")
+    unit: Words = key("What model coordinates are in", "mm")
+
+
+class IntersectionKeys(FocalKeys):
+    """The rays of two photos of known orientation."""
+
+    base: Triple = key("From the left to the right perspective centre", unit="unit")
+    left: Triple = key("Omega, phi, kappa of the left photo", (0.0, 0.0, 0.0), unit="deg")
+    right: Triple = key("Omega, phi, kappa of the right photo", (0.0, 0.0, 0.0), unit="deg")
+    unit: Words = key("What coordinates are in", "m")
+    left_ray: Flag = key("Y of the left ray, as printed, instead of the mean of both", False)  # noqa: FBT003
+
+
+class StripKeys(RelativeKeys):
+    """A strip formed from photos alone."""
+
+    scale_transfer: Annotated[Words, After(one_of("least_squares", "distances"))] = key(
+        "Weights of the pass points: least_squares or distances", "least_squares"
+    )
+
+
+class AbsoluteKeys(StepKeys):
+    """A model fitted to known points."""
+
+    unit: Words = key("What ground coordinates are in", "m")
+
+
+class PolynomialKeys(AbsoluteKeys):
+    """The deformation of a strip along one axis."""
+
+    terms: list[Annotated[Words, After(one_of(*POWERS))]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
+
+
+class ResectionKeys(FocalKeys):
+    """One photo oriented on known points."""
+
+    sigma_um: Positive = key("Standard deviation of an image coordinate", 5.0, unit="um")
+    unit: Words = key("What ground coordinates are in", "m")
+
+
+class BundleKeys(ResectionKeys):
+    """All photos and points adjusted at once."""
+
+    base: Positive = key("Length of the first base, without control", 100.0, unit="unit")
+    control: Words | None = key("Table of given points: point, x_ground, y_ground, z_ground", None)
+    control_sigma: Positive = key("Standard deviation of a given coordinate", 0.05, unit="unit")

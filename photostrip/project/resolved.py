@@ -12,9 +12,8 @@ from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.keys import Distortion, Ellipsoid, ProjectFile
+from photostrip.project.reading import Node, path_of
 from photostrip.project.sections import Section, Text
-from photostrip.project.yaml.reading import path_of
-from photostrip.project.yaml.tree import Node
 
 HEADER = (
     "# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.\n"

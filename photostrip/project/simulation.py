@@ -16,6 +16,7 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.keys import CRS, UNDULATION, Distortion, Ellipsoid, Unit
+from photostrip.project.reading import Reading, read_file
 from photostrip.project.sections import (
     After,
     Axes,
@@ -34,7 +35,6 @@ from photostrip.project.sections import (
     schema_number,
     wrong,
 )
-from photostrip.project.yaml.reading import Reading, read_file
 
 USUAL = simulation.Spec()
 USUAL_MODELS = simulation.Models()

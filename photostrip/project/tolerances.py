@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import LARGEST_NUMBER
+from photostrip.project.reading import read_file
 from photostrip.project.sections import (
     After,
     Flag,
@@ -21,7 +22,6 @@ from photostrip.project.sections import (
     key,
     schema_number,
 )
-from photostrip.project.yaml.reading import read_file
 
 USUAL = Tolerances()
 T = TypeVar("T", bound=Section)

@@ -20,9 +20,8 @@ LEFT_OUT = (
     "statement",
     "certificate",
     "residuals",
-    "parallaxes",
     "link_residuals",
-    "covariances",
+    "correlations",
     "fiducial_marks",
 )
 FIELDS = re.compile(r" \|(?= |$)")
@@ -41,6 +40,7 @@ class Quantity:
     unit_key: str = ""  # key of the same block or table that names the unit
     many: bool = False  # whether a list of such values stands there
     optional: bool = False  # whether it may be missing, where a kind of project does not have it
+    derived: bool = False  # whether other columns tell it: it does not stand in result.json
     # kind of tolerance by which two results are compared; name: a column that names its rows; empty: not compared
     compared: str = ""
     head: str = ""  # of its column in reports; * stands for the axis of the frame
@@ -94,11 +94,12 @@ def _everything() -> Block:
         elif line and not line.startswith("#"):
             keys, form, meaning, *more = (part.strip() for part in FIELDS.split(line))
             compared, head, shown, below, *_ = *more, *[""] * 4
-            entry = replace(Quantity.of(form, meaning), optional=keys.endswith("?"), compared=compared)
+            entry = replace(Quantity.of(form, meaning), optional=keys[-1] in "?*", derived=keys.endswith("*"))
             heads = list(_expanded(head))
-            for number, path in enumerate(_expanded(keys.removesuffix("?"))):
+            for number, path in enumerate(_expanded(keys.rstrip("?*"))):
                 above, _, last = path.rpartition(".")
-                own = replace(entry, head=heads[number % len(heads)], shown=shown, below=below)
+                head = heads[number % len(heads)]
+                own = replace(entry, compared=compared, head=head, shown=shown, below=below)
                 for place in places:
                     (_made(place, above, Block) if above else place)[last] = own
     return found

@@ -18,6 +18,7 @@ from photostrip.result.adjustment import (
     rejected,
     strips,
 )
+from photostrip.result.derived import with_derived
 from photostrip.result.description import SCHEMA
 from photostrip.result.numbers import natural_rank
 from photostrip.result.points import (
@@ -84,10 +85,9 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **photos.photos_of(result, images),
         "points": points,
         "residuals": bundle.with_reliability(result, images, photos.residuals_of(result, images)),
-        "parallaxes": pairs.parallaxes_of(result, rank),
         **({"link_residuals": links.residuals_of(result, rank)} if result.model_strips else {}),
     }
-    body = in_frame(body)
+    body = in_frame(with_derived(body))
     verdict = verdict_of(body)
     head = {
         "photostrip_result": SCHEMA,

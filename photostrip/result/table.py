@@ -216,6 +216,8 @@ def as_array(entry: Quantity, values: Sequence[Any] | NDArray[Any]) -> NDArray[A
         return np.array(values, kind)  # None becomes NaN
     if kind is int:
         return np.array(values, float)
+    if kind is bool:
+        return np.fromiter((None if value is None else bool(value) for value in values), object, len(values))
     return np.fromiter(values, object, len(values))
 
 
@@ -252,8 +254,19 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[Document]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
+def stored(table: Table) -> dict[str, list[Any]]:
+    """Return the columns of a table that stand in result.json, flags as 1 and 0."""
+    found = {}
+    for name in table.columns:
+        entry, column = table.quantities[name], table.values(name)
+        if not entry.derived:
+            is_flag = entry.kind == "flag"
+            found[name] = [None if value is None else int(value) for value in column] if is_flag else column
+    return found
+
+
 def plain_of(value: Any) -> Any:  # noqa: ANN401 (any part of a document)
     """Return a document as JSON has it: its tables as blocks of lists."""
     if isinstance(value, dict):
         return {key: plain_of(each) for key, each in value.items()}
-    return {name: value.values(name) for name in value.columns} if isinstance(value, Table) else value
+    return stored(value) if isinstance(value, Table) else value

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
 from math import sqrt
 from typing import Any
 
@@ -15,7 +17,13 @@ from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.sheets.sheet import Fact, Rows, Sheet, by_columns, plain
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.accuracy import Theodolite
-from photostrip.terrestrial.normal_case import Attitude, Phototheodolite, directions_from_photo, photo_from_directions
+from photostrip.terrestrial.normal_case import (
+    Attitude,
+    Phototheodolite,
+    directions_from_photo,
+    partials,
+    photo_from_directions,
+)
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
 from photostrip.units import ARCSECONDS, MICROMETRES
 
@@ -75,7 +83,21 @@ def directions_sheet(
         errors = np.column_stack([found.angle, found.vertical]) * ARCSECONDS
         more = tuple(Field(f"sigma_{name}_arcsec", "arcsec 2", f"m_{name}") for name in ("lambda", "beta"))
     points = _points(attitude, ids, xz, directions, more, errors)
-    return Sheet("directions", "Directions of image points", facts, [points])
+    by = partials(reduced, camera.principal_distance, attitude.rotation)
+    rates = np.concatenate([by.by_xz, by.by_f[..., None]], axis=-1).reshape(len(xz), -1) * ARCSECONDS / MICROMETRES
+    slopes = Rows(
+        "derivatives",
+        "Derivatives, seconds of arc for each µm, eq. 4",
+        (
+            Field("point"),
+            *(
+                Field(f"{direction}_by_{name}_arcsec_um", "ratio +4", f"{direction} / {name}")
+                for direction, name in product(("lambda", "beta"), ("x", "z", "f"))
+            ),
+        ),
+        by_columns(ids, rates),
+    )
+    return Sheet("directions", "Directions of image points", facts, [points, slopes], main="points")
 
 
 def photo_sheet(camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], directions: Floats) -> Sheet:
@@ -106,19 +128,30 @@ def _sigma(sigma: float) -> Fact:
 
 
 def accuracy_sheet(
-    camera: Phototheodolite, attitude: Attitude, sigma: float, grid: Grid, *, as_printed: bool = False
+    camera: Phototheodolite,
+    ends: Sequence[Attitude],
+    sigma: float,
+    grid: Grid,
+    theodolites: Mapping[str, tuple[float, float]],
+    *,
+    as_printed: bool = False,
 ) -> Sheet:
-    """Return the accuracy over the photo with which directions must be measured.
+    """Return the accuracy over the photo with which directions must be measured, and the rounds that give it.
 
+    ends: of the base; of two the stricter counts everywhere.
     sigma: standard deviation of image coordinates and principal distance in mm.
+    theodolites: standard deviations of a horizontal and of a vertical direction in one round, arcseconds.
     """
     xz = _grid_points(grid)
-    exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
+    of_ends = [accuracy.required(xz, camera.principal_distance, sigma, each.rotation) for each in ends]
+    angle, horizontal, vertical = (
+        np.minimum.reduce([getattr(each, name) for each in of_ends]) for name in ("angle", "horizontal", "vertical")
+    )
     columns = {
-        "horizontal_arcsec": ("Horizontal directions, m_lambda in ″", exact.horizontal),
-        "vertical_arcsec": ("Vertical directions, m_beta in ″", exact.vertical),
+        "horizontal_arcsec": ("Horizontal directions, m_lambda in ″", horizontal),
+        "vertical_arcsec": ("Vertical directions, m_beta in ″", vertical),
     }
-    angle, note = exact.angle, ""
+    note = "" if len(ends) == 1 else "of both ends of the base the stricter one"
     if as_printed:
         printed = accuracy.as_printed(xz, camera.principal_distance, sigma)
         angle = printed.horizontal * np.sqrt(2.0)
@@ -126,7 +159,7 @@ def accuracy_sheet(
             "horizontal_arcsec": ("Horizontal directions, m_lambda in ″", printed.horizontal),
             "vertical_arcsec": ("Vertical directions as printed (eq. 6), m_beta in ″", printed.vertical_eq6),
             "vertical_eq5_arcsec": ("Vertical directions as printed (eq. 5), m_beta in ″", printed.vertical_eq5),
-            "vertical_exact_arcsec": ("Vertical directions, exact, m_beta in ″", exact.vertical),
+            "vertical_exact_arcsec": ("Vertical directions, exact, m_beta in ″", vertical),
         }
         note = (
             "The vertical directions inherit sec(lambda') from eq. 3, where cos(lambda') is right; without `as_printed`"
@@ -134,8 +167,10 @@ def accuracy_sheet(
         note += " the exact values are given."
     needed = [float((columns[f"{name}_arcsec"][1] * ARCSECONDS).min()) for name in ("horizontal", "vertical")]
     formulas = "as printed" if as_printed else "exact"
+    right = [replace(each, key="right", label="right end") for each in camera_facts(camera, ends[-1])[1:]]
     facts = [
-        *camera_facts(camera, attitude),
+        *camera_facts(camera, ends[0]),
+        *(right if len(ends) > 1 else []),
         _sigma(sigma),
         Fact("formulas", formulas, text=formulas),
         Fact(
@@ -151,6 +186,22 @@ def accuracy_sheet(
     tables = [_over_photo(xz, (angles, *columns_over), values)]
     if note:
         tables.append(Rows("", "", (), (), below=[note]))
+    turns = {
+        name: [accuracy.rounds_for(each, limit) for each, limit in zip(sizes, needed, strict=True)]
+        for name, sizes in theodolites.items()
+    }
+    rounds = Rows(
+        "rounds",
+        "Rounds, both faces, that give it",
+        (
+            Field("theodolite"),
+            *fields("sigma_horizontal_arcsec sigma_vertical_arcsec", "arcsec 2", "horizontal vertical", "one round, ″"),
+            *fields("horizontal vertical", "count", below="rounds"),
+            Field("rounds", "count"),
+        ),
+        [(name, *theodolites[name], *counts, max(counts)) for name, counts in turns.items()],
+    )
+    tables.append(rounds)
     return Sheet("direction-accuracy", "Required accuracy of correction directions", facts, tables)
 
 

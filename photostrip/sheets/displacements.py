@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import counted
-from photostrip.project.survey import ReportFrame, Survey
+from photostrip.project.terrestrial import ReportFrame, Survey
 from photostrip.report.page.parts import DASH, Words
 from photostrip.report.page.tables import Cell, Field, fields
 from photostrip.result.numbers import natural_rank

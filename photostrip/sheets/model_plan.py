@@ -14,7 +14,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import counted
 from photostrip.planning.closed_form import ORDER
-from photostrip.planning.deformation import DEFORMATION_TERMS
+from photostrip.planning.deformation import DEFORMATION_TERMS, base_frame_elements, relative_errors
 from photostrip.planning.model_plan import BothForms, Forecast, GivenErrors, ModelSpec, NamedPoint, simple_accuracy
 from photostrip.planning.single_model import ELEMENTS, FREE, PARAMETERS
 from photostrip.report.page.tables import Cell, Field, fields, with_unit
@@ -191,6 +191,7 @@ def _tables(forecast: Forecast) -> Iterator[Rows]:
             for each in simple_accuracy(spec)
         ],
     )
+    yield _single_errors(spec)
     if spec.points:
         sigmas, adjusted = _with_plan(forecast.at_points), _with_plan(forecast.at_points_adjusted)[:, 2:]
         yield Rows(
@@ -208,6 +209,33 @@ def _tables(forecast: Forecast) -> Iterator[Rows]:
             [(*_place(point), *row) for point, row in zip(spec.points, np.hstack([sigmas, adjusted]), strict=True)],
             note="standard deviations; adjusted: with the elements as unknowns; x, y on the ground at photo scale",
         )
+
+
+def _single_errors(spec: ModelSpec) -> Rows:
+    """Give what one error of each kind does to a corner of the model, by the differentials of the normal case."""
+    corner, one = np.array([spec.base, spec.width, spec.base]), spec.image_sigma
+    kinds = {
+        "x of the left photo": ((one, 0.0, 0.0), 0.0, 0.0),
+        "y of the left photo": ((0.0, one, 0.0), 0.0, 0.0),
+        "x parallax": ((0.0, 0.0, spec.parallax_sigma), 0.0, 0.0),
+        "principal distance": ((0.0, 0.0, 0.0), 0.0, one),
+        "base, 1 ppm": ((0.0, 0.0, 0.0), 1e-6, 0.0),
+    }
+    ground = np.array([spec.base, spec.width, -spec.focal]) * spec.ground_unit
+    return Rows(
+        "single",
+        "What one error of each kind does to the corner of the model, eq. 10.7",
+        (Field("error_of", head="error of"), Field("error_um", "um 1"), *fields("x_m y_m z_m", "m +4", HEADS)),
+        [
+            (
+                name,
+                (sum(errors) + focal) * MICROMETRES or None,
+                *(relative_errors(corner, spec.focal, errors, base=base, principal_distance=focal) * ground),
+            )
+            for name, (errors, base, focal) in kinds.items()
+        ],
+        note=f"of one standard deviation; the corner at x {spec.base:.1f}, y {spec.width:.1f} mm",
+    )
 
 
 def _place(point: NamedPoint) -> tuple[Any, ...]:
@@ -284,15 +312,23 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
         f"dZ = E0 + A x + B y + C x y + D x². Twist C moves a corner by {corner[0]:.3f} m against the middle, bending D"
         f" by {corner[1]:.3f} m; E0, A, B go into the absolute orientation."
     )
+    alpha1, _, alpha2, _, _ = base_frame_elements(spec.element_errors, spec.base).tolist()
+    constant, tilt = -(spec.focal**2) / spec.base * (alpha2 - alpha1) * unit, -alpha1 * spec.base * unit
+    frames = (
+        "dx2 at the control counts heights from the left photo as it lies, dZ from the base and without the constant"
+        f" f (dα2′ - dα1′) of eq. 10.9: dx2 is {constant:+.3f} m more, and {tilt:+.3f} m over a base by the tilt dα1′."
+        " The absolute orientation takes both back."
+    )
     units = ("m", "m/mm", "m/mm", "m/mm²", "m/mm²")
     yield Rows(
         "surface",
         "The model bent by the given elements",
         (Field("term"), Field("value", "ratio g4"), Field("unit")),
         [*zip(DEFORMATION_TERMS, (bent.surface * unit).tolist(), units, strict=True)],
-        below=(words,),
+        below=(words, frames),
     )
     heights = {
+        "c_um": "What the elements add to the x parallax, c of eq. 10.9, µm",
         "raised_z_m": "Height errors before levelling, dZ, m",
         "left_z_m": "Height errors that the absolute orientation leaves, m",
         "left_x_m": "Errors along the flight that it leaves, m",
@@ -305,9 +341,10 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
         (
             Field("x_mm", "mm 0"),
             Field("y_mm", "mm 0", "y \\ x"),
+            Field("c_um", "um +1", heights["c_um"]),
             *(Field(key, "m +3", heights.get(key), shown=key in heights) for key in keys),
         ),
-        by_columns(places[:, 0].tolist(), places[:, 1], bent.raised * unit, bent.left * unit),
+        by_columns(places[:, 0].tolist(), places[:, 1], bent.c * MICROMETRES, bent.raised * unit, bent.left * unit),
         across="x_mm",
         tables=tuple(heights),
     )

@@ -10,7 +10,7 @@ from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, b
 from photostrip.planning.screening import ARC_MINUTES, ScreeningOutcome
 from photostrip.report.page.tables import Cell, Field, fields
 from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.terrestrial.accuracy import PLACES, DisplacementSpec, plan_displacements
 from photostrip.units import MICROMETRES
 
@@ -255,32 +255,33 @@ def screening_sheet(name: str, outcome: ScreeningOutcome) -> Sheet:
             Field("parallax_percent", "percent 1", "by parallax"),
             Field("later_percent", "percent 1", "by later tests"),
             Field("missed_percent", "percent 1", "missed"),
-            Field("good_lost_per_error", "ratio 3", "good lost", "per error"),
+            *fields("beside_percent instead_percent", "percent 1", "beside instead", "good lost, %"),
             Field("mean_change_arcmin", "arcmin 1", "change", "mean, ′"),
             Field("worst_change_arcmin", "arcmin 1", "change", "worst, ′"),
         ),
         [
             (
                 each.method,
-                *(100 * share for share in (each.parallax, each.later, each.missed)),
-                each.lost,
+                *(100 * share for share in (each.parallax, each.later, each.missed, each.beside, each.instead)),
                 each.mean_change * ARC_MINUTES,
                 each.worst_change * ARC_MINUTES,
             )
             for each in outcome.methods
         ],
-        note=f"parallax+grubbs: {limit}; change: largest of the elements in pairs that kept an error",
+        note=f"in % of the errors; good points are lost beside wrong ones that are found, or instead of one that stays;"
+        f" parallax+grubbs: {limit}; change: largest of the elements in pairs that kept an error",
     )
     detection = Rows(
         "detection",
         "",
-        hidden("method", "zone", "size_um", "errors", "found", "found_percent"),
+        hidden("method", "zone", "size_um", "errors", "by_parallax", "found", "found_percent"),
         [
             (
                 each.method,
                 found.zone,
                 round(found.size * MICROMETRES, 3),
                 found.errors,
+                found.by_parallax,
                 found.found,
                 round(100 * found.found / found.errors, 2) if found.errors else None,
             )
@@ -295,20 +296,24 @@ def screening_sheet(name: str, outcome: ScreeningOutcome) -> Sheet:
 
 
 def _shares(outcome: ScreeningOutcome, key: str) -> Rows:
-    """Print the shares that each method finds, by zone or by size."""
+    """Print the shares that each method finds, by zone or by size; of the first test of the textbook its own, too."""
     factor, head = (1, "zone") if key == "zone" else (MICROMETRES, "size, µm")
+    early = [each for each in outcome.methods if each.method == "parallax+grubbs"]
+    counted_by = [(each, "by_parallax") for each in early] + [(each, "found") for each in outcome.methods]
+    heads = [("parallax", "alone")] * len(early) + [(each.method, "") for each in outcome.methods]
     rows = []
     for value in dict.fromkeys(getattr(each, key) for each in outcome.methods[0].detection):
-        those = [[each for each in method.detection if getattr(each, key) == value] for method in outcome.methods]
-        counts = [sum(each.errors for each in found) for found in those]
+        errors = sum(each.errors for each in outcome.methods[0].detection if getattr(each, key) == value)
         shares = [
-            100 * sum(each.found for each in found) / count if count else None
-            for found, count in zip(those, counts, strict=True)
+            100 * sum(getattr(each, name) for each in method.detection if getattr(each, key) == value) / errors
+            if errors
+            else None
+            for method, name in counted_by
         ]
-        rows.append((value * factor, counts[-1], *shares))
-    methods = (Field("", "percent 1", each.method, "") for each in outcome.methods)
+        rows.append((value * factor, errors, *shares))
+    columns = (Field("", "percent 1", *each) for each in heads)
     title = f"Found, % of the errors of a {key}"
-    return Rows("", title, (Field("", "ratio g4", head), Field("", "count", "errors"), *methods), rows)
+    return Rows("", title, (Field("", "ratio g4", head), Field("", "count", "errors"), *columns), rows)
 
 
 def _effects(outcome: ScreeningOutcome, sizes: Sequence[float]) -> Rows:

@@ -14,8 +14,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.similarity import Similarity
 from photostrip.strip import absolute_orientation
-from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs
-from photostrip.strip.relative_orientation.solution import iterate_elements, solve_elements, start_values
+from photostrip.strip.relative_orientation import Pairs, collect_pairs, iterate_elements, solve_elements, start_values
 
 if TYPE_CHECKING:  # single steps need none of it
     from photostrip.pipeline.results import Result, StripResult

@@ -170,20 +170,26 @@ class Sheet:
 
     def rendered(self, form: str, width: int = USUAL) -> str:
         """Return the sheet as a file holds it: ``text`` so wide, ``md``, ``html``, ``json`` or ``csv``."""
-        from photostrip.formats.output.result_json import to_json
-
-        if form == "json":
-            return to_json(self.document())
         if form == "csv":
             return self.csv()
-        if form == "html":
+        return rendered(form, self.title, self.sections(), self.document() if form == "json" else {}, width)
+
+
+def rendered(form: str, title: str, sections: Iterable[Section], document: Document, width: int | None = None) -> str:
+    """Return sections as a file holds them: ``text`` so wide, ``md``, ``html``, or their document as ``json``."""
+    match form:
+        case "json":
+            from photostrip.formats.output.result_json import to_json
+
+            return to_json(document)
+        case "html":
             from photostrip import __version__
             from photostrip.report.html import sections_html
 
-            return sections_html(self.title, __version__, self.sections())
-        if form == "md":
-            return to_markdown(self.title, self.sections())
-        return to_text(self.title, self.sections(), width)
+            return sections_html(title, __version__, sections)
+        case "md":
+            return to_markdown(title, sections)
+    return to_text(title, sections, width or USUAL)
 
 
 def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:

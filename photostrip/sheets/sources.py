@@ -99,7 +99,7 @@ def _directions() -> Iterator[Worked]:
         level = found.horizontal
         yield Worked("[002]", f"m_lambda, {camera}", example.horizontal, level, level, "″", "rounded to 0.5")
         remark = f"with {example.factor:g} of the other {found.printed_factor:.2f}" if far else "sec for cos in eq. 3"
-        remark += f"; by eq. 5 {found.eq5:.2f}"
+        remark += f"; by eq. 4 {found.eq4:.2f}, by eq. 5 {found.eq5:.2f}"
         yield Worked("[002]", f"m_beta, {camera}", example.vertical, found.eq6, found.vertical, "″", remark)
         remark = "belongs to the other camera" if far else ""
         yield Worked("[002]", f"1 + x²/f², {camera}", example.factor, found.factor, found.factor, "", remark)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import compress
+from itertools import compress, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,6 @@ from photostrip.arrays import Floats
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, pair_scales
 from photostrip.notes import counted
-from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.report.page.parts import Facts, Part, Words
 from photostrip.report.page.tables import Cell, Field, fields, written
@@ -21,10 +20,13 @@ from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
 from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden
 from photostrip.strip import absolute_orientation
-from photostrip.strip.formed_strip import FirstPhoto, base_angles, intersect_models
-from photostrip.strip.polynomial_terms import POWERS
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
+from photostrip.strip.polynomial import POWERS, degree_of
+from photostrip.strip.relative_orientation import ELEMENTS
 
+CUBIC = 3  # degree of eq. 150
+DEGREE = "polynomial.degree"
+FOUR_BANDS = "control at four distances along the strip"
 PAIRED = 15  # control points whose 105 distances can still be read
 PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")
 TURNS, TURN_HEADS = ("alpha", "omega", "kappa"), ("α", "ω", "κ")
@@ -35,7 +37,7 @@ SYMBOLS = {
     "q": "y1h - y2h, y parallax of the photos turned into the base frame, mm",
     "[wqq]": "sum of the weighted squares of q, mm^2",
     "tau, nu": "direction and inclination of the base, in the strip; of one pair in the left photo, with bx, by, bz",
-    "A": "rotation of a photo, image to strip, by rows",
+    "A, A_taunu": "rotation of a photo, image to strip, and of a base frame to strip, by rows",
     "BX, BY, BZ": "components of the base, scale of the strip",
     "N": "ray factor of the left ray, from the model whose base is as long as the first one",
     "D, D'": "distance of a pass point from the common centre, in the model before and after the junction",
@@ -57,7 +59,7 @@ class Departure(NamedTuple):
     key: str  # of ``processing``
     textbook: tuple[str, ...]  # values of the key that follow it
     words: str  # what the textbook does
-    here: dict[str, str]  # what the program does, by value of the key
+    here: dict[str, str]  # what the program does, by its name for it
 
 
 CHOICES = (
@@ -106,7 +108,6 @@ CHOICES = (
         textbook=("polynomial",),
         words="polynomials",
         here={
-            "auto": "bundle adjustment, which the strip only starts; polynomials where there can be none",
             "similarity": "none",
             "bundle": "bundle adjustment, which the strip only starts",
         },
@@ -114,22 +115,25 @@ CHOICES = (
     Departure(
         subject="degree",
         source="eq. 150",
-        key="polynomial.degree",
+        key=DEGREE,
         textbook=("3",),
         words="cubic",
-        here={"auto": "1 to 3 or none, by evidence", "1": "1", "2": "2"},
+        here={},
     ),
 )
 
 
-def departures_of(settings: Settings) -> list[tuple[str, ...]]:
-    """Return the choices in which a run departs from the textbook."""
-    values = {
+def departures_of(result: Result) -> list[tuple[str, ...]]:
+    """Return where what a run did departs from the textbook, whatever its settings asked for."""
+    settings = result.settings
+    degrees, asked = [_degrees(strip) for strip in result.strips], settings.polynomial.degree
+    whole = all(degree == (CUBIC, CUBIC) for degree in degrees)
+    done = {
         "relative.screening": settings.relative.screening,
         "intersection": settings.formation.intersection,
         "scale_transfer": settings.formation.scale_transfer,
-        "adjustment": settings.adjustment,
-        "polynomial.degree": settings.polynomial.degree,
+        "adjustment": "bundle" if result.bundle is not None else _adjusted(result),
+        DEGREE: str(CUBIC) if whole else _said_degrees(degrees, asked),
         "control_weights": settings.absolute.control_weights,
     }
     return [
@@ -137,12 +141,30 @@ def departures_of(settings: Settings) -> list[tuple[str, ...]]:
             each.subject,
             each.source,
             each.words,
-            each.here[values[each.key]],
-            f"processing.{each.key}: {each.textbook[0]}",
+            each.here.get(done[each.key], done[each.key]),
+            FOUR_BANDS if each.key == DEGREE and asked == str(CUBIC) else f"processing.{each.key}: {each.textbook[0]}",
         )
         for each in CHOICES
-        if values[each.key] not in each.textbook
+        if done[each.key] not in each.textbook
     ]
+
+
+def _adjusted(result: Result) -> str:
+    return "polynomial" if any(strip.polynomial is not None for strip in result.strips) else "similarity"
+
+
+def _degrees(strip: StripResult) -> tuple[int, int]:
+    """Return the degrees in plan and in height that a strip was given; 0 where none."""
+    if strip.polynomial is None:
+        return 0, 0
+    plan, _, height = (degree_of(axis.terms) for axis in strip.polynomial.axes)
+    return plan, height
+
+
+def _said_degrees(degrees: Sequence[tuple[int, int]], asked: str) -> str:
+    told = [f"{plan} in plan, {height} in height" for plan, height in dict.fromkeys(degrees)]
+    why = "by evidence" if asked == "auto" else f"{asked} asked for"
+    return f"{'; '.join(told)} ({why})"
 
 
 def trace_sheet(result: Result) -> Sheet:
@@ -156,7 +178,7 @@ def trace_sheet(result: Result) -> Sheet:
     unit = result.settings.angle_unit
     symbols = Rows("", "Symbols", (), (), above=[Facts(tuple(SYMBOLS.items())), Words(f"Angles in {unit}.")])
     columns = (Field("subject"), Field("source"), Field("textbook"), Field("here"), Field("key", head="to follow it"))
-    departures = [] if result.model_strips else departures_of(result.settings)
+    departures = [] if result.model_strips else departures_of(result)
     tables = [symbols, Rows("departures", "Where this run departs from the textbook", columns, departures)]
     for strip in result.strips:
         if strip.model_stages is None:
@@ -310,9 +332,16 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     )
     title = f"Chain of strip {strip.strip.id}: orientation and base of every photo, eq. 125-136"
     yield Rows("chain", title, columns, rows)
+    places = fields(" ".join(MATRIX), " 8")
     matrices = [(photo, *turn.ravel()) for photo, turn in zip(photos, formed.rotations, strict=True)]
     note = "A = A_taunu A(α2′, ω2′, κ2′), eq. 131-133, by rows."
-    yield Rows("", "", (Field("photo"), *fields(" ".join(MATRIX), " 8")), matrices, note=note)
+    yield Rows("", "", (Field("photo"), *places), matrices, note=note)
+    turns = base_frames(formed.rotations[:-1], strip.of_photos.orientation.elements).reshape(-1, 9)
+    frames = [(strip.strip.id, *names, *turn) for names, turn in zip(pairwise(photos), turns.tolist(), strict=True)]
+    note = (
+        "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; its first column is the base."
+    )
+    yield Rows("base_frames", "", (*hidden("strip"), Field("left"), Field("right"), *places), frames, note=note)
 
 
 def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:

@@ -23,7 +23,7 @@ from photostrip.geodesy.local_frame import geocentric_from_geodetic, local_axes_
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.spec import Spec
-from photostrip.strip import lens_distortion
+from photostrip.strip import corrections
 from photostrip.strip.corrections import refraction_constant
 
 WAVES = 5  # sine waves that make up the relief
@@ -213,5 +213,5 @@ def sees(spec: Spec, photos: Photos, photo: Numbers, xyz: Floats) -> Flags:
     xy, depth = project(photos, photo, xyz - photos.centers[photo], spec.camera.principal_distance)
     inside = (np.abs(xy + spec.camera.principal_point) <= USABLE / 2.0 * np.asarray(spec.format)).all(axis=1)
     if spec.camera.distortion is not None:
-        inside &= np.hypot(xy[:, 0], xy[:, 1]) <= USABLE * lens_distortion.reach(spec.camera.distortion)[1]
+        inside &= np.hypot(xy[:, 0], xy[:, 1]) <= USABLE * corrections.distortion_reach(spec.camera.distortion)[1]
     return np.asarray(inside & (depth > 0.0))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from photostrip.camera import Camera
 from photostrip.errors import Fault
 from photostrip.notes import counted
-from photostrip.strip import lens_distortion
+from photostrip.strip import corrections
 
 FILM = Camera(
     "film",
@@ -283,7 +283,7 @@ def _camera(spec: Spec) -> Iterator[Fault]:
     if camera.format is None:
         yield _fault("camera.format", "the camera has no format", "width and height of the photo in mm")
     yield from _each("camera.format", camera.format, 1.0, 2_000.0, "mm")
-    for fault in lens_distortion.faults(camera):
+    for fault in corrections.distortion_faults(camera):
         yield replace(fault, key="camera.distortion")
     yield from _range("camera.pixel_size", camera.pixel_size, 1e-5, 1.0, "mm")
 

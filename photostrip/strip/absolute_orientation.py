@@ -13,22 +13,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geodesy.local_frame import EARTH_RADIUS
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.local_frame import EARTH_RADIUS, IntermediateFrame
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, Spread, collinearity
 from photostrip.notes import listed
 from photostrip.points import ControlPoints
-
-if TYPE_CHECKING:
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.geodesy.local_frame import IntermediateFrame
 
 LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50

@@ -26,9 +26,8 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.points import ControlPoints
 from photostrip.statistics import chi2_quantile
-from photostrip.strip.polynomial_terms import columns
-from photostrip.strip.relative_orientation.orientation import Orientation
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.strip.polynomial import term_columns
+from photostrip.strip.relative_orientation import MINIMUM_POINTS, Orientation
 from photostrip.strip.resection import KnownPhotos, Resection, derivatives
 from photostrip.strip.strip_errors import StripErrors, blocks, entries_of
 
@@ -99,7 +98,7 @@ class FitOperator:
     def polynomial_columns(self, xyz: Floats) -> list[Floats]:
         """Terms of the three polynomials at points, scaled to about one."""
         plan = xyz[:, :2] / (self.reach, self.breadth)
-        found = {terms: columns(plan, terms) for terms in set(self.terms)}
+        found = {terms: term_columns(plan, terms) for terms in set(self.terms)}
         return [found[terms] for terms in self.terms]
 
 

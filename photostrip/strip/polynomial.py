@@ -1,4 +1,9 @@
-"""Strip polynomials: the deformation that a similarity leaves, corrected axis by axis by least squares.
+"""Terms of the strip polynomials, and which of them control points can carry where they stand.
+
+How many terms control can carry is decided by its stations along the strip, not by how many points there are: a cubic
+needs four different ones.
+
+Strip polynomials: the deformation that a similarity leaves, corrected axis by axis by least squares.
 
 Which degree they get is decided by evidence: an F test of each step and errors at control points left out.
 """
@@ -14,8 +19,101 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import f_p_value
-from photostrip.strip import polynomial_terms
 from photostrip.strip.absolute_orientation import Targets
+
+# Powers of X and Y. A term here, in the ladder and in the order of dropping is a term of X, Y and Z alike.
+POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
+# Ladder: terms, degree, stations along the strip, points for an exact fit. One more point is asked for unless forced.
+LADDER = (
+    (("1", "X", "Y", "XY", "X^2", "X^3"), 3, 4, 6),
+    (("1", "X", "Y", "XY", "X^2"), 2, 3, 5),
+    (("1", "X", "Y", "X^2"), 2, 3, 4),
+    (("1", "X", "Y"), 1, 2, 3),
+)
+DROP_ORDER = ("XY", "Y", "X^3", "X^2", "X")
+# smallest over largest singular value of the scaled design; below it the control cannot tell the terms apart
+LEAST_RATIO = 0.02
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes that make columns comparable and stations different."""
+
+    reach: float  # largest distance of control from the origin along the strip, metres
+    breadth: float  # half width of the strip, metres
+    spacing: float  # distance along the strip that makes two stations different, metres (one base)
+
+
+def term_columns(xyz: Floats, terms: Sequence[str]) -> Floats:
+    """Design columns (n, k) of the terms, powers of X and Y of positions (n, 3), unscaled."""
+    x, y = xyz[:, 0], xyz[:, 1]  # eq. 150
+    result = np.empty((len(xyz), len(terms)))
+    for column, (i, j) in enumerate(POWERS[term] for term in terms):
+        np.multiply(x**i, y**j, out=result[:, column])
+    return result
+
+
+def count_stations(x: Floats, spacing: float) -> int:
+    """Largest number of points along the strip of which no two are nearer than a spacing."""
+    return len(np.unique(bands(x, spacing))) if len(x) else 0
+
+
+def bands(x: Floats, spacing: float) -> Numbers:
+    """Count the bands across the strip from its beginning; the number of the band of each point.
+
+    A point farther than the spacing from the first of its band opens the next.
+    """
+    order, opening, first = np.argsort(x, kind="stable"), [], -np.inf
+    for each in x[order].tolist():
+        opening.append(each - first >= spacing)
+        first = each if opening[-1] else first
+    number = np.empty(len(x), np.intp)
+    number[order] = np.cumsum(opening) - 1
+    return number
+
+
+def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False) -> tuple[str, ...]:
+    """Terms that given control points (n, 3) can carry, up to a degree; none when the control carries none.
+
+    Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
+    `forced` allows a fit without redundancy.
+    """
+    stations = count_stations(xyz[:, 0], sizes.spacing)
+    terms = ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)
+    for drop in DROP_ORDER:
+        if not terms or term_condition(xyz, terms, sizes) < 1 / LEAST_RATIO:
+            break
+        terms = dropped(terms, drop)
+    return terms
+
+
+def ladder(stations: int, points: int, degree: int) -> tuple[str, ...]:
+    """Most terms that so many stations and points carry, up to a degree; none where nothing is carried."""
+    for candidate, power, needed, exact in LADDER:
+        if power <= degree and stations >= needed and points >= exact:
+            return candidate
+    return ()
+
+
+def dropped(terms: tuple[str, ...], drop: str) -> tuple[str, ...]:
+    return tuple(term for term in terms if term != drop)
+
+
+def term_scales(terms: Sequence[str], sizes: Sizes) -> Floats:
+    """Sizes of the columns at the end of the control and the edge of the strip, shape (k,), metres to their powers."""
+    return np.array([sizes.reach**i * sizes.breadth**j for i, j in (POWERS[t] for t in terms)])
+
+
+def term_condition(xyz: Floats, terms: Sequence[str], sizes: Sizes) -> float:
+    """Condition number of the scaled columns at positions (n, 3), metres; infinite when they cannot be told apart."""
+    values = np.linalg.svd(term_columns(xyz, terms) / term_scales(terms, sizes), compute_uv=False)
+    return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+
+
+def degree_of(terms: Sequence[str]) -> int:
+    """Highest power of X among the terms; 0 without terms."""
+    return max((POWERS[t][0] for t in terms), default=0)
+
 
 Terms = tuple[tuple[str, ...], ...]  # of the three axes
 
@@ -56,10 +154,10 @@ class FitProblem:
     breadth: float  # half width of the strip, metres
 
     @cached_property
-    def sizes(self) -> polynomial_terms.Sizes:
+    def sizes(self) -> Sizes:
         """What makes columns comparable."""
         reach = max(float(np.abs(self.xyz[:, 0]).max()), 1e-6)
-        return polynomial_terms.Sizes(reach, self.breadth, self.spacing)
+        return Sizes(reach, self.breadth, self.spacing)
 
     @cached_property
     def misclosures(self) -> Floats:
@@ -100,14 +198,14 @@ class Design:
     @classmethod
     def of(cls, problem: FitProblem, weight: Floats, terms: tuple[str, ...]) -> Design:
         """Decompose the columns of one axis."""
-        rows, scales = weight > 0, polynomial_terms.scales(terms, problem.sizes)
-        columns = polynomial_terms.columns(problem.xyz, terms) / scales
+        rows, scales = weight > 0, term_scales(terms, problem.sizes)
+        columns = term_columns(problem.xyz, terms) / scales
         root = np.sqrt(weight / weight[rows].mean()) if rows.any() else np.zeros(len(weight))
         basis, triangle = np.zeros(columns.shape), np.zeros((0, 0))
         condition = float("nan")
         if terms:
             basis[rows], triangle = np.linalg.qr(columns[rows] * root[rows, None])
-            condition = polynomial_terms.condition(problem.xyz[rows], terms, problem.sizes)
+            condition = term_condition(problem.xyz[rows], terms, problem.sizes)
         return cls(
             terms=terms,
             rows=rows,
@@ -218,7 +316,7 @@ class Polynomial:
 
     def corrections(self, xyz: Floats) -> Floats:
         """Corrections of positions (n, 3) after the similarity, to be added. Source: [001] eq. 150."""
-        columns = {terms: polynomial_terms.columns(xyz, terms) for terms in {axis.terms for axis in self.axes}}
+        columns = {terms: term_columns(xyz, terms) for terms in {axis.terms for axis in self.axes}}
         return np.column_stack([columns[axis.terms] @ axis.coefficients for axis in self.axes])
 
     def __call__(self, xyz: Floats) -> Floats:
@@ -233,7 +331,7 @@ def fit(problem: FitProblem, settings: PolynomialSettings) -> Polynomial:
     """
     counts = problem.by_axis > 0
     x = problem.xyz[:, 0]
-    stations = tuple(polynomial_terms.count_stations(x[counts[:, axis]], problem.spacing) for axis in (0, 2))
+    stations = tuple(count_stations(x[counts[:, axis]], problem.spacing) for axis in (0, 2))
     chosen: list[tuple[str, ...]] = []
     evidence: list[Evidence] = []
     fits_of: Fits = cache(partial(fit_axes, problem))  # plan and height often weigh the same candidates
@@ -246,7 +344,7 @@ def fit(problem: FitProblem, settings: PolynomialSettings) -> Polynomial:
     fits = fits_of(tuple(chosen))
     inside = x[counts.any(axis=1)]
     return Polynomial(
-        degree=max(polynomial_terms.degree_of(terms) for terms in chosen),
+        degree=max(degree_of(terms) for terms in chosen),
         axes=(fits[0], fits[1], fits[2]),
         evidence=tuple(evidence),
         stations=(stations[0], stations[1]),
@@ -261,7 +359,7 @@ def _by_degree(problem: FitProblem, asked: str) -> list[Terms]:
     plan, height = (problem.xyz[_counted(problem, k)] for k in (0, 2))
     found: list[Terms] = []
     for degree in range(1, (int(asked) if forced else 3) + 1):
-        x, z = (polynomial_terms.choose_terms(xyz, degree, problem.sizes, forced=forced) for xyz in (plan, height))
+        x, z = (choose_terms(xyz, degree, problem.sizes, forced=forced) for xyz in (plan, height))
         found.append((x, x, z))  # X and Y count together
     return found
 
@@ -304,7 +402,7 @@ def decide(
         evidence.append(
             Evidence(
                 group=group,
-                degree=polynomial_terms.degree_of(terms),
+                degree=degree_of(terms),
                 terms=len(terms),
                 redundancy=_redundancy(of_group, DETERMINED[group]),
                 rms=_rms(residuals),
@@ -312,7 +410,7 @@ def decide(
                 left_out_by=by,
                 f=f,
                 p=p,
-                against=polynomial_terms.degree_of(candidates[against]),
+                against=degree_of(candidates[against]),
                 accepted=bool(accepted or number == 0),
             )
         )
@@ -373,7 +471,7 @@ def _left_out_errors(
     An outer band is not left out: predicting it would be extrapolation, which no user of a polynomial should do.
     """
     counted = np.flatnonzero(_counted(problem, axes[0]))
-    group = polynomial_terms.bands(problem.xyz[counted, 0], problem.spacing)
+    group = bands(problem.xyz[counted, 0], problem.spacing)
     order = np.argsort(group, kind="stable")
     inner = np.split(counted[order], np.flatnonzero(np.diff(group[order])) + 1)[1:-1]
     if inner and _carried_without(problem, counted, inner, candidates[-1]):
@@ -389,19 +487,19 @@ def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numb
     with it: the next band begins at the same point as before. The squares of singular values are those of the whole
     design less the band's share, so that nothing is fitted again.
     """
-    stations = polynomial_terms.count_stations(problem.xyz[counted, 0], problem.spacing) - 1
-    degree = polynomial_terms.degree_of(terms)
+    stations = count_stations(problem.xyz[counted, 0], problem.spacing) - 1
+    degree = degree_of(terms)
     sizes = np.array([len(rows) for rows in inner])
     for size in np.unique(sizes).tolist():
-        chosen = polynomial_terms.ladder(stations, len(counted) - size, degree)
+        chosen = ladder(stations, len(counted) - size, degree)
         left = np.array([rows for rows in inner if len(rows) == size])
-        for drop in polynomial_terms.DROP_ORDER:
+        for drop in DROP_ORDER:
             if not chosen or not len(left):
                 break
-            good = _conditions_without(problem, counted, left, chosen) < 1 / polynomial_terms.LEAST_RATIO
+            good = _conditions_without(problem, counted, left, chosen) < 1 / LEAST_RATIO
             if good.any() and chosen != terms:
                 return False
-            left, chosen = left[~good], polynomial_terms.dropped(chosen, drop)
+            left, chosen = left[~good], dropped(chosen, drop)
         if len(left) and chosen != terms:
             return False
     return True
@@ -409,7 +507,7 @@ def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numb
 
 def _conditions_without(problem: FitProblem, counted: Numbers, groups: Numbers, terms: tuple[str, ...]) -> Floats:
     """Condition numbers of the scaled design without each of several groups of points of equal size."""
-    scaled = polynomial_terms.columns(problem.xyz, terms) / polynomial_terms.scales(terms, problem.sizes)
+    scaled = term_columns(problem.xyz, terms) / term_scales(terms, problem.sizes)
     parts = scaled[groups]
     squares = np.linalg.eigvalsh(scaled[counted].T @ scaled[counted] - parts.transpose(0, 2, 1) @ parts)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.statistics import SIGMA_FROM_MEDIAN
-from photostrip.strip.relative_orientation import solution
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
+from photostrip.strip import relative_orientation
+from photostrip.strip.relative_orientation import MINIMUM_POINTS, Pairs
 
 TUNING = 3.0  # standard deviations up to which an observation keeps its weight [Krarup 1980]
 # standard deviation of a scale from the median of n normal residuals, over the scale, times sqrt(n) [Hampel 1974]
@@ -74,7 +74,7 @@ def start_values(pairs: Pairs) -> Floats:
     Where the points say so, by more than the first azimuth that is tried again, the right photo is turned beforehand.
     """
     slope = _slopes(pairs)
-    slope[np.abs(np.angle(slope)) < solution.RETRY_AZIMUTHS[0]] = 1.0
+    slope[np.abs(np.angle(slope)) < relative_orientation.RETRY_AZIMUTHS[0]] = 1.0
     back = (pairs.right @ np.array([1.0, 1j])) / slope[pairs.pair]
     shift, counts = pairs.left - np.column_stack([back.real, back.imag]), (pairs.weight > 0).astype(float)
     middle = [medians(shift[:, axis], counts, pairs.pair, pairs.size) for axis in (0, 1)]
@@ -93,12 +93,12 @@ def _slopes(pairs: Pairs) -> NDArray[np.complex128]:
     weight = pairs.weight
     slope = np.ones(pairs.size, complex)
     for _ in range(ROBUST_ITERATIONS):
-        total = np.maximum(pairs.sums(weight), solution.RIDGE)
+        total = np.maximum(pairs.sums(weight), relative_orientation.RIDGE)
         off = [z - (pairs.sums(weight * z) / total)[pairs.pair] for z in (left, right)]
         slope = pairs.sums(weight * np.conj(off[0]) * off[1])
-        slope /= np.maximum(pairs.sums(weight * np.abs(off[0]) ** 2), solution.RIDGE)
+        slope /= np.maximum(pairs.sums(weight * np.abs(off[0]) ** 2), relative_orientation.RIDGE)
         size = np.abs(off[1] - slope[pairs.pair] * off[0])
-        scale = np.maximum(scales(size, pairs.weight, pairs.pair, pairs.size), solution.RIDGE)
+        scale = np.maximum(scales(size, pairs.weight, pairs.pair, pairs.size), relative_orientation.RIDGE)
         weight = pairs.weight * falling_weights(size / scale[pairs.pair])
     slope[slope == 0] = 1.0
     return slope
@@ -113,17 +113,20 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
     elements = start.copy()
     for _ in range(ROBUST_ITERATIONS):
         with np.errstate(all="ignore"):
-            q, jacobian = solution.linearised_parallaxes(elements, pairs)
+            q, jacobian = relative_orientation.linearised_parallaxes(elements, pairs)
         q = np.where(np.isfinite(q), q, 1e6)
         jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
         size = np.abs(q) * np.sqrt(pairs.weight)
         scale = np.maximum(sigma, scales(size, pairs.weight, pairs.pair, pairs.size))
         weight = pairs.weight * falling_weights(size / scale[pairs.pair])
-        change, _ = solution.gauss_newton_steps(
-            solution.Linearised(q, jacobian), replace(pairs, weight=weight), solution.RIDGE, solution.LARGEST_STEP
+        change, _ = relative_orientation.gauss_newton_steps(
+            relative_orientation.Linearised(q, jacobian),
+            replace(pairs, weight=weight),
+            relative_orientation.RIDGE,
+            relative_orientation.LARGEST_STEP,
         )
         elements = elements + change
-    return RobustElements(solution.facing(solution.reduced_angles(elements), pairs)[0], scale)
+    return RobustElements(relative_orientation.facing(relative_orientation.reduced_angles(elements), pairs)[0], scale)
 
 
 def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:
@@ -146,15 +149,15 @@ def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:
 def _agreeing(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     """Count the points of each pair that agree with its elements and lie in front of its cameras."""
     with np.errstate(all="ignore"):
-        size = np.abs(solution.y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
-        good = (size <= TUNING) & (pairs.weight > 0) & solution.in_front_of_cameras(elements, pairs)
+        size = np.abs(relative_orientation.y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
+        good = (size <= TUNING) & (pairs.weight > 0) & relative_orientation.in_front_of_cameras(elements, pairs)
     return pairs.sums(good.astype(float))
 
 
 def _best_sets(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     """Elements by the set of five points, solved to the first order, that leaves the smallest parallaxes."""
     with np.errstate(all="ignore"):
-        q, jacobian = solution.linearised_parallaxes(elements, pairs)
+        q, jacobian = relative_orientation.linearised_parallaxes(elements, pairs)
     result = elements.copy()
     for number in range(pairs.size):
         rows = np.flatnonzero((pairs.pair == number) & (pairs.weight > 0) & np.isfinite(q))
@@ -173,6 +176,6 @@ def _best_step(design: Floats, residual: Floats) -> Floats:
     draws = np.argpartition(chance, MINIMUM_POINTS, axis=1)[:, :MINIMUM_POINTS]
     draws = np.take_along_axis(draws, np.take_along_axis(chance, draws, axis=1).argsort(axis=1), axis=1)
     steps = -(np.linalg.pinv(design[draws]) @ residual[draws][:, :, None])[:, :, 0]
-    steps = np.where(np.abs(steps).max(axis=1, keepdims=True) < solution.LARGEST_STEP, steps, 0.0)
+    steps = np.where(np.abs(steps).max(axis=1, keepdims=True) < relative_orientation.LARGEST_STEP, steps, 0.0)
     left = np.log1p(np.abs(residual + steps @ design.T)).sum(axis=1)
     return np.asarray(steps[left.argmin()], float)

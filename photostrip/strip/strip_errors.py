@@ -36,9 +36,10 @@ from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_o
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.points import take_rows
 from photostrip.strip.formed_strip import FormedStrip
-from photostrip.strip.relative_orientation.orientation import BY_ROW, Orientation
-from photostrip.strip.relative_orientation.pairs import Pairs
-from photostrip.strip.relative_orientation.solution import (
+from photostrip.strip.relative_orientation import (
+    BY_ROW,
+    Orientation,
+    Pairs,
     in_front_of_cameras,
     linearised_parallaxes,
     normal_matrices,

@@ -63,7 +63,9 @@ class Printed:
     """Standard deviations by the formulas as they are printed, for a level camera."""
 
     horizontal: Floats  # (...): m_lambda by eq. 5 and 6, which is right, radians
-    # vertical_eq5, vertical_eq6: (...): m_beta by eq. 5 and by its shorter form eq. 6, radians
+    # (...): m_beta by all terms of eq. 4, by eq. 5, which drops those through g = sec(lambda'), and by its shorter form
+    # eq. 6, radians
+    vertical_eq4: Floats
     vertical_eq5: Floats
     vertical_eq6: Floats
 
@@ -71,14 +73,16 @@ class Printed:
 def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printed:
     """Accuracy of directions by the formulas of the source, for a standard deviation `sigma` of image coordinates, mm.
 
-    Source: [002] eq. 5 and 6 as printed, see ``photostrip sources``.
+    Source: [002] eq. 4 to 6 as printed, see ``photostrip sources``.
     """
     x, z = np.moveaxis(np.asarray(xz, float), -1, 0)
     f = principal_distance
     g = np.sqrt(1.0 + (x / f) ** 2)  # sec(lambda'), which should have been its inverse
     denominator = f**2 + (z * g) ** 2
+    by_x, by_z, by_f = z * x / (f * g), f * g, z * g + z * x**2 / (f**2 * g)  # of z g / f, times f^2
+    eq4 = sigma * np.sqrt(by_x**2 + by_z**2 + by_f**2) / denominator
     eq5 = sigma * g * np.sqrt(f**2 + z**2) / denominator
-    return Printed(sigma / np.sqrt(2.0 * (f**2 + x**2)), eq5, sigma / np.sqrt(denominator))
+    return Printed(sigma / np.sqrt(2.0 * (f**2 + x**2)), eq4, eq5, sigma / np.sqrt(denominator))
 
 
 def supported(
@@ -141,7 +145,8 @@ class WorkedExample:
     example: Example
     horizontal: float  # m_lambda, exact
     printed_factor: float  # m_beta by eq. 6 with the factor that is printed: what the source computed
-    # eq5, eq6: m_beta by eq. 5 and by eq. 6 with the factor of the camera
+    # m_beta by eq. 4, by eq. 5 and by eq. 6 with the factor of the camera
+    eq4: float
     eq5: float
     eq6: float
     factor: float  # the factor 1 + x^2/f^2 of the camera
@@ -158,6 +163,7 @@ def worked(example: Example) -> WorkedExample:
         example=example,
         horizontal=float(exact.horizontal) * ARCSECONDS,
         printed_factor=float(m * ARCSECONDS / np.sqrt(f**2 + z**2 * example.factor)),
+        eq4=float(printed.vertical_eq4) * ARCSECONDS,
         eq5=float(printed.vertical_eq5) * ARCSECONDS,
         eq6=float(printed.vertical_eq6) * ARCSECONDS,
         factor=factor,

@@ -11,17 +11,15 @@ import pytest
 
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity
-from photostrip.strip.formed_strip import model_points
-from photostrip.strip.intersection import intersect
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.formed_strip import intersect, model_points
+from photostrip.strip.relative_orientation import collect_pairs, orient_pairs
 from tests.attitudes import rotation_x, rotation_y, rotation_z
 from tests.strips import MICROMETRE, measured
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.strip.relative_orientation.orientation import Orientation
+    from photostrip.strip.relative_orientation import Orientation
 
     Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from photostrip.threads import THREAD_VARIABLES
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from photostrip.batch.tasks import Answer, Task
+    from photostrip.batch.evaluation import Answer, Task
 
 
 def _eat() -> None:

@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from photostrip.batch.evaluation import evaluate
 from photostrip.formats.output.simulation import project_files
@@ -21,7 +21,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from typing import Self
 
-    from photostrip.batch.tasks import Answer, Limits, Task
+    from photostrip.batch.evaluation import Answer, Limits, Task
 
 PHOTOS = 4
 NOT_RESULTS = {".batch.lock"}
@@ -55,15 +55,20 @@ def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "photostrip", "batch", *arguments]
 
 
-def environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "COLUMNS": "100"}
+def environment(**more: str) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "COLUMNS": "100", **more}
 
 
-def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def run(folder: Path, *arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:  # noqa: ANN401
     """Run ``photostrip batch`` as a process of its own."""
-    return subprocess.run(
-        command(*arguments), cwd=folder, env=environment(), capture_output=True, text=True, check=False
-    )
+    given: dict[str, Any] = {"cwd": folder, "env": environment(), "capture_output": True, "text": True}
+    return subprocess.run(command(*arguments), check=False, **(given | options))
+
+
+def started(folder: Path, *arguments: str, mark: str = "MARK", **options: Any) -> subprocess.Popen[str]:  # noqa: ANN401
+    """Start ``photostrip batch`` with a variable in its environment; its outputs are pipes if nothing else is said."""
+    given: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    return subprocess.Popen(command(*arguments), cwd=folder, env=environment(**{mark: "1"}), text=True, **given)
 
 
 def tree(folder: Path) -> dict[str, bytes]:

@@ -15,22 +15,22 @@ import numpy as np
 import pytest
 
 from photostrip.batch import cluster as clusters
-from photostrip.batch.evaluation import evaluate
-from photostrip.batch.parcel import pack
-from photostrip.batch.result_folder import program
+from photostrip.batch.evaluation import Limits, Task, evaluate, pack
+from photostrip.batch.folder import program
 from photostrip.batch.run import Run, Stop
 from photostrip.batch.selection import choose
-from photostrip.batch.tasks import Limits, Task
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch import faulty
 from tests.batch.projects import environment, run, tree, write_projects
+from tests.batch.projects import started as start_batch
 from tests.geodesy.frames import write_gtx
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import IO, Any
 
+    from tests.calls import Capture
     from tests.forked import Forks
 
 DASK = ("distributed.cli.dask_scheduler", "distributed.cli.dask_worker")
@@ -45,14 +45,8 @@ def started(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """Run a part of a cluster in a folder of its own, where none of the projects' paths leads anywhere."""
     folder.mkdir(parents=True)
     with (folder / "log.txt").open("w") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
-            cwd=folder,
-            env=environment(),
-            stdout=log,
-            stderr=log,
-            text=True,
-        )
+        command = [sys.executable, "-m", f"distributed.cli.{arguments[0]}", *arguments[1:]]
+        process = subprocess.Popen(command, cwd=folder, env=environment(), stdout=log, stderr=log, text=True)
     try:
         yield process
     finally:
@@ -86,10 +80,7 @@ def worker(folder: Path, address: str, *options: str) -> AbstractContextManager[
 @contextmanager
 def batch(folder: Path, *arguments: str) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
     """Start a batch; give the process and what it says."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "photostrip", "batch", "strips", "-o", "out", *arguments],
-        cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+    with start_batch(folder, "strips", "-o", "out", *arguments) as process:
         assert process.stderr is not None
         yield process, process.stderr
 
@@ -210,7 +201,7 @@ def test_machines_come_and_go(tmp_path: Path) -> None:
     ],
 )
 def test_a_scheduler_that_is_not_there_is_told_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], address: str, message: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture, address: str, message: str
 ) -> None:
     monkeypatch.setattr(clusters, "CONNECT_SECONDS", 0.5)
     write_projects(tmp_path, 1)
@@ -222,7 +213,7 @@ def test_a_scheduler_that_is_not_there_is_told_at_once(
 
 
 def test_dask_is_asked_for_when_it_is_not_installed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     write_projects(tmp_path, 1)
     monkeypatch.setitem(sys.modules, "dask", None)

@@ -6,21 +6,20 @@ import os
 import random
 import shutil
 import signal
-import subprocess
 import time
 import warnings
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
+from subprocess import DEVNULL
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.formats.output.batch import parsed_record
 from photostrip.formats.text import writing
 from photostrip.formats.text.source import digest
-from tests.batch.projects import Alone, command, environment, run, tree, write_projects
+from tests.batch.projects import run, started, tree, write_projects
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,14 +29,6 @@ PROJECTS = 4
 WHOLE_RUNS = 2  # killed as whole commands with their workers
 SUMMARIES = {"summary.txt", "summary.csv", "summary.json", "junit.xml"}
 BATCH = ["batch", "strips", "-o", "out", "-j", "2"]
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    write_projects(tmp_path / "strips", PROJECTS)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_job, "LocalPool", Alone)
-    return tmp_path
 
 
 def in_a_child(act: Callable[[], object]) -> int:
@@ -125,12 +116,17 @@ def test_whole_commands_killed_with_their_workers(tmp_path: Path) -> None:
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
     for _ in range(WHOLE_RUNS):
         before = trusted(tmp_path / "out")
-        with subprocess.Popen(
-            command("strips", "-o", "out", "-j", "2", "--force"),
-            cwd=tmp_path,
-            env={**environment(), mark: "1"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+        with started(
+            tmp_path,
+            "strips",
+            "-o",
+            "out",
+            "-j",
+            "2",
+            "--force",
+            mark=mark,
+            stdout=DEVNULL,
+            stderr=DEVNULL,
         ) as process:
             time.sleep(draw.uniform(0.3 * duration, duration))
             process.kill()
@@ -168,15 +164,7 @@ def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals) -> No
 
     write_projects(tmp_path / "strips", 40)
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
-    with subprocess.Popen(
-        command("strips", "-o", "out", "-j", "2"),
-        cwd=tmp_path,
-        env={**environment(), mark: "1"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
+    with started(tmp_path, "strips", "-o", "out", "-j", "2", mark=mark, start_new_session=True) as process:
         assert process.stderr is not None
         for _ in range(3):
             process.stderr.readline()
@@ -203,14 +191,7 @@ def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals) -> No
 def test_a_worker_killed_from_outside_costs_nothing(tmp_path: Path) -> None:
     write_projects(tmp_path / "strips", 6)
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
-    with subprocess.Popen(
-        command("strips", "-o", "out", "-j", "2"),
-        cwd=tmp_path,
-        env={**environment(), mark: "1"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with started(tmp_path, "strips", "-o", "out", "-j", "2", mark=mark) as process:
         assert process.stderr is not None
         process.stderr.readline()
         worker = next(each for each in marked(mark) if int(each) != process.pid)

@@ -9,10 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from photostrip.batch.evaluation import evaluate
-from photostrip.batch.outcomes import failure
+from photostrip.batch.evaluation import Limits, Task, evaluate, failure
 from photostrip.batch.pool import LocalPool, answers, cause_of, share_of_memory
-from photostrip.batch.tasks import Limits, Task
 from photostrip.errors import Fault
 from tests.batch import faulty
 from tests.batch.projects import write_projects

@@ -7,13 +7,12 @@ import json
 import os
 import pty
 import re
-import subprocess
 import xml.etree.ElementTree as ET
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.batch.outcomes import EXIT_CODES, failure, not_run
+from photostrip.batch.evaluation import EXIT_CODES, failure, not_run
 from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
@@ -21,7 +20,7 @@ from photostrip.formats.output.batch import parsed_record, summary_csv, summary_
 from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, outcome_line
 from photostrip.report.page.layout import to_text
 from photostrip.report.page.progress import batch_progress
-from tests.batch.projects import command, environment, write_projects
+from tests.batch.projects import started, write_projects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -108,19 +107,13 @@ def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_quick_start")
-def test_a_person_at_a_terminal_sees_a_bar(tmp_path: Path) -> None:
+def test_a_person_at_a_terminal_sees_a_bar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stderr is a terminal: a bar is there and goes away, failures stay above it; stdout is the summary alone."""
     write_projects(tmp_path / "strips", 12)
     (tmp_path / "strips" / "s3" / "control.csv").unlink()
+    monkeypatch.setenv("TERM", "xterm")
     ours, theirs = pty.openpty()
-    with subprocess.Popen(
-        command("strips", "-j", "1", "--format", "csv"),
-        cwd=tmp_path,
-        env={**environment(), "TERM": "xterm"},
-        stdout=subprocess.PIPE,
-        stderr=theirs,
-        text=True,
-    ) as process:
+    with started(tmp_path, "strips", "-j", "1", "--format", "csv", stderr=theirs) as process:
         os.close(theirs)
         seen = b""
         while True:

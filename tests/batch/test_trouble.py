@@ -11,26 +11,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.batch.result_folder import opened
-from photostrip.cli.jobs import batch as batch_job
+from photostrip.batch.folder import opened
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from photostrip.formats.text import writing
 from photostrip.formats.text.writing import write_files
-from tests.batch.projects import Alone, command, environment, tree, write_projects
+from tests.batch.projects import run, tree
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from tests.calls import Capture
+
+PROJECTS = 5
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    write_projects(tmp_path / "strips", 5)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_job, "LocalPool", Alone)
-    return tmp_path
 
 
 def as_anybody() -> None:
@@ -41,15 +35,7 @@ def as_anybody() -> None:
 
 
 def batch(folder: Path, *arguments: str, before: Callable[[], None] = as_anybody) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command(*arguments),
-        cwd=folder,
-        env=environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=before,
-    )
+    return run(folder, *arguments, preexec_fn=before)
 
 
 def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
@@ -67,7 +53,7 @@ def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
 
 @pytest.mark.slow
 def test_a_disk_that_is_full_for_a_while_costs_those_projects_only(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     with monkeypatch.context() as patch:
         full(patch, "out/s2/")
@@ -82,9 +68,7 @@ def test_a_disk_that_is_full_for_a_while_costs_those_projects_only(
 
 
 @pytest.mark.slow
-def test_a_disk_that_stays_full_ends_the_batch(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_disk_that_stays_full_ends_the_batch(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     full(monkeypatch, "out/")
     assert main(["batch", "strips", "-o", "out"]) == 2
     captured = capsys.readouterr()
@@ -104,7 +88,7 @@ def test_an_earlier_result_survives_a_full_disk(here: Path, monkeypatch: pytest.
 
 
 @pytest.mark.slow
-def test_a_result_replaces_no_file_of_its_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_result_replaces_no_file_of_its_project(here: Path, capsys: Capture) -> None:
     first = here / "strips" / "s1"
     (first / "control.csv").rename(first / "points.csv")
     project = first / "project.yaml"
@@ -144,7 +128,7 @@ def test_inputs_that_may_not_be_read_in_the_middle(here: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: Capture) -> None:
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
     before = tree(here / "out")
     capsys.readouterr()

@@ -15,6 +15,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 SAMPLE = ROOT / "sample_data" / "simulated-20" / "project.yaml"
@@ -22,7 +24,7 @@ FLAT = "flight: {photos: 5, attitude_sigma_deg: [0, 0, 0]}\nterrain: {relief: 0}
 UNDETERMINED = ("--set", "processing.self_calibration=[principal_distance]")  # is flown height, over flat ground
 
 
-def run(capsys: pytest.CaptureFixture[str], project: Path, *options: str) -> dict[str, Any]:
+def run(capsys: Capture, project: Path, *options: str) -> dict[str, Any]:
     """Run a project and give its result."""
     assert main(["run", str(project), "--format", "json", *options]) == 0
     return checked(json.loads(capsys.readouterr().out), "result.json")
@@ -41,7 +43,7 @@ def simulated(folder: Path, spec: str, **changes: str) -> Path:
     return project
 
 
-def test_two_strips_of_three_photos_on_four_corners(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_two_strips_of_three_photos_on_four_corners(capsys: Capture, tmp_path: Path) -> None:
     """The block of the textbooks: no strip has control enough of its own, together they have."""
     project = simulated(tmp_path, "flight: {photos: 3, strips: 2}\ncontrol: {layout: corners, check: 12}\n")
     control = project.with_name("control.csv")
@@ -59,7 +61,7 @@ def test_two_strips_of_three_photos_on_four_corners(capsys: pytest.CaptureFixtur
     assert 2 < check["height"]["rms_um"] < 20
 
 
-def test_a_photo_that_is_a_strip_of_its_own(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_photo_that_is_a_strip_of_its_own(capsys: Capture, tmp_path: Path) -> None:
     spec = "flight: {photos: 4}\ncontrol: {bands: 2, per_band: 3, check: 6}\n"
     single = '"1003"]\n  - {id: B, camera: film, photos: ["1004"]}\n'
     project = simulated(tmp_path, spec, **{'"1003", "1004"]\n': single})
@@ -69,7 +71,7 @@ def test_a_photo_that_is_a_strip_of_its_own(capsys: pytest.CaptureFixture[str], 
     assert [photo["id"] for photo in document["photos"]] == ["1001", "1002", "1003", "1004"]
 
 
-def test_the_classical_adjustment_stands_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_classical_adjustment_stands_beside_it(capsys: Capture) -> None:
     classical = run(capsys, SAMPLE)["classical"]
     alone = run(capsys, SAMPLE, "--set", "processing.adjustment=polynomial")
     summary = alone["summary"]
@@ -86,9 +88,7 @@ def test_the_classical_adjustment_stands_beside_it(capsys: pytest.CaptureFixture
     assert left in said
 
 
-def test_where_no_bundle_can_be_had_it_is_the_polynomial_and_says_why(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_where_no_bundle_can_be_had_it_is_the_polynomial_and_says_why(capsys: Capture, tmp_path: Path) -> None:
     project = simulated(tmp_path, FLAT)
     capsys.readouterr()
     document = run(capsys, project, *UNDETERMINED)

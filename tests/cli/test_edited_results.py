@@ -17,6 +17,8 @@ from tests.reports import RESULT, saved
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Call, Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 CASES = 60
@@ -77,7 +79,7 @@ def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: 
 
 @pytest.mark.parametrize(("command", "key"), [("report", "models.left"), ("compare", "models.left")])
 def test_a_missing_key_is_told_with_all_that_lead_to_it(
-    command: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    command: str, key: str, tmp_path: Path, capsys: Capture
 ) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
     block, column = key.split(".")
@@ -88,14 +90,32 @@ def test_a_missing_key_is_told_with_all_that_lead_to_it(
     assert f"{key}: is missing" in capsys.readouterr().err
 
 
-def test_digits_by_the_thousand_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "result.json"
-    file.write_text('{"photostrip_result": ' + "1" * 5000 + "}", encoding="utf-8")
-    with pytest.raises(InputError, match="thousands of digits"):
-        read_result(str(file))
+@pytest.mark.parametrize("options", [["report"], ["statement"], ["compare", str(RESULT)], ["compare", "--again"]])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"\x00\xff", "is not text"),
+        (b"{", "is not JSON"),
+        (b"[]", "expected"),
+        (b"{}", "has no key `photostrip_result`"),
+        (b'{"photostrip_result": 1}', "run the project again"),
+        (b'{"photostrip_result": 2}', "is missing"),
+        (b'{"photostrip_result": ' + b"1" * 5000 + b"}", "thousands of digits"),
+    ],
+)  # fmt: skip
+def test_what_is_no_result_is_refused(
+    options: list[str], content: bytes, words: str, tmp_path: Path, call: Call
+) -> None:
+    file = tmp_path / "bad.json"
+    file.write_bytes(content)
+    code, out, err = call(options[0], file, *options[1:])
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: {file}:")
+    assert words in err
 
 
-def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: Capture) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
     document["name"] += ESCAPE
     document["control"]["id"][0] = ESCAPE
@@ -109,7 +129,7 @@ def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: pyt
         assert form == "github" or ("\\u001b[2J" if form == "json" else "x1b") in out
 
 
-def test_what_the_user_types_is_shown_too(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_the_user_types_is_shown_too(capsys: Capture) -> None:
     assert main(["run", "no\x1b[31m.yaml"]) == 2
     err = capsys.readouterr().err
     assert "\x1b" not in err

@@ -20,6 +20,8 @@ from tests.results import spec, write_project
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 PHOTOS = ["0123", "NO", "1:20", "1e3", "~"]
@@ -112,9 +114,7 @@ def test_the_resolved_project_runs_and_gives_the_same(
     assert hashes[0] == hashes[1]
 
 
-def test_the_report_shows_them(
-    both: tuple[Path, Path, dict[str, str], dict[str, str]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_report_shows_them(both: tuple[Path, Path, dict[str, str], dict[str, str]], capsys: Capture) -> None:
     assert main(["report", str(both[1]), "--verbose", "--width", "200"]) == 0
     out = capsys.readouterr().out
     document = read_result(str(both[1] / "result.json"))
@@ -133,7 +133,7 @@ def test_the_report_shows_them(
     ],
 )
 def test_of_ids_that_look_the_same_the_difference_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], measured: str, given: str, words: str
+    tmp_path: Path, capsys: Capture, measured: str, given: str, words: str
 ) -> None:
     project = write_project(tmp_path, spec())
     for name, new in (("observations.csv", measured), ("control.csv", given)):

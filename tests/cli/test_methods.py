@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from typing import TYPE_CHECKING
 
@@ -18,16 +17,12 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Call, Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 PROJECT = str(ROOT / "sample_data" / "simulated-20" / "project.yaml")
 BUNDLE = ("--set", "processing.adjustment=bundle")
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    code = main(["run", *arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def single_photos(folder: Path) -> Path:
@@ -44,8 +39,8 @@ def single_photos(folder: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = run(capsys, PROJECT, "--compare-methods", "--format", "json")
+def test_all_methods_stand_side_by_side(call: Call) -> None:
+    code, out, _ = call("run", PROJECT, "--compare-methods", "--format", "json")
     document = json.loads(out)
     assert code == 0
     assert [row["adjustment"] for row in document["methods"]] == list(METHODS)
@@ -53,13 +48,13 @@ def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> N
     rms = {name: row["check_plan_rms"] for name, row in by_name.items()}
     assert rms["bundle"] < rms["polynomial"] < rms["similarity"]
     assert document["best"] == {"plan": "bundle", "height": "bundle"}
-    single = json.loads(run(capsys, PROJECT, *BUNDLE, "--format", "json")[1])
+    single = json.loads(call("run", PROJECT, *BUNDLE, "--format", "json")[1])
     assert single["summary"]["check"]["plan"]["rms"] == rms["bundle"]
 
 
 @pytest.mark.slow
-def test_text_and_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    code, out, err = run(capsys, PROJECT, "--compare-methods", "-o", str(tmp_path / "out"))
+def test_text_and_files(call: Call, tmp_path: Path) -> None:
+    code, out, err = call("run", PROJECT, "--compare-methods", "-o", str(tmp_path / "out"))
     assert code == 0
     assert out.startswith("Methods: simulated-20\n")
     assert "Smallest at check points: bundle." in out
@@ -70,7 +65,7 @@ def test_text_and_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_method_that_is_refused_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_method_that_is_refused_is_told(call: Call, tmp_path: Path) -> None:
     """Two control points are too few for any method; one adjustment alone fails with its own exit code."""
     folder = ROOT / "sample_data" / "simulated-20"
     lines = (folder / "control.csv").read_text(encoding="utf-8").splitlines(keepends=True)
@@ -78,20 +73,20 @@ def test_a_method_that_is_refused_is_told(capsys: pytest.CaptureFixture[str], tm
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     control = [line for line in lines[1:] if ",check" not in line]
     (tmp_path / "control.csv").write_text("".join([lines[0], *control[:2]]), encoding="utf-8")
-    code, out, err = run(capsys, str(tmp_path / "project.yaml"), "--compare-methods")
+    code, out, err = call("run", str(tmp_path / "project.yaml"), "--compare-methods")
     assert (code, out) == (3, "")
     assert "control" in err
 
 
 @pytest.mark.slow
 def test_a_method_that_does_not_take_the_project_is_told_with_its_reason(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    call: Call, capsys: Capture, tmp_path: Path
 ) -> None:
     """Single photos are for bundles only: the project itself is refused by three methods of four."""
     project = single_photos(tmp_path)
     capsys.readouterr()
-    code, out, err = run(
-        capsys, str(project), "--compare-methods", "--format", "json", "-o", str(tmp_path / "out"), "--html"
+    code, out, err = call(
+        "run", str(project), "--compare-methods", "--format", "json", "-o", str(tmp_path / "out"), "--html"
     )
     assert (code, "error" in err) == (0, False)
     document = json.loads(out)
@@ -111,20 +106,20 @@ def test_a_method_that_does_not_take_the_project_is_told_with_its_reason(
 @pytest.mark.slow
 @pytest.mark.usefixtures("_adjusted_each_time")
 def test_where_the_bundle_does_not_converge_auto_takes_the_polynomial(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
-    code, _, err = run(capsys, PROJECT, *BUNDLE)
+    code, _, err = call("run", PROJECT, *BUNDLE)
     assert code == 3
     (refused,) = (line for line in err.splitlines() if line.startswith("error: the bundle adjustment did not converge"))
-    code, text, _ = run(capsys, PROJECT, "--format", "json")
+    code, text, _ = call("run", PROJECT, "--format", "json")
     assert (code, json.loads(text)["adjustment"]) == (0, "polynomial")
     assert refused.removeprefix("error: ") in " ".join(json.loads(text)["notes"]["message"])
 
 
 @pytest.mark.slow
 def test_points_of_single_photos_that_stand_out_are_told_without_precision(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    call: Call, capsys: Capture, tmp_path: Path
 ) -> None:
     project = single_photos(tmp_path)
     control = project.parent / "control.csv"
@@ -134,42 +129,9 @@ def test_points_of_single_photos_that_stand_out_are_told_without_precision(
     lines[row] = ",".join([point, x, y, f"{float(z) + 8.0:.4f}", *rest])
     control.write_text("\n".join(lines) + "\n", encoding="utf-8")
     capsys.readouterr()
-    code, out, _ = run(capsys, str(project), *BUNDLE, "--set", "processing.precision=false", "--format", "json")
+    code, out, _ = call("run", str(project), *BUNDLE, "--set", "processing.precision=false", "--format", "json")
     assert code == 0
     assert f"check point {point} (" in json.loads(out)["verdict"]["look_at"][0]
-
-
-def test_html_of_a_comparison_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = run(capsys, PROJECT, "--compare-methods", "--html")
-    assert (code, "--output" in err) == (2, True)
-
-
-def test_options_that_do_not_go_together(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    arguments = ["--compare-methods", "-o", str(tmp_path), "--depfile", str(tmp_path / "d")]
-    code, _, err = run(capsys, PROJECT, *arguments)
-    assert code == 2
-    assert "no --depfile" in err
-
-
-@pytest.mark.slow
-def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    code, out, _ = run(capsys, PROJECT, *BUNDLE, "-o", str(tmp_path), "--verbose")
-    assert code == 0
-    for title in ("Bundle adjustment", "Reliability", "Precision", "Check points"):
-        assert f"── {title} ──" in out
-    assert "Ties between strips" not in out
-    code = main(["report", str(tmp_path / "result.json"), "--verbose"])
-    assert capsys.readouterr().out == out
-    rays = list(csv.DictReader((tmp_path / "residuals.csv").read_text(encoding="utf-8").splitlines()))
-    document = read_result(str(tmp_path / "result.json"))
-    assert sum(ray["redundancy_x"] != "" for ray in rays) == document["counts"]["image_points_used"]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_adjusted_each_time")
-def test_the_bundle_is_the_same_every_time(capsys: pytest.CaptureFixture[str]) -> None:
-    first, second = (run(capsys, PROJECT, *BUNDLE, "--format", "json")[1] for _ in range(2))
-    assert first == second
 
 
 # ------------------------------------------------------------------------------------ what is wrong, by its exit code
@@ -192,35 +154,9 @@ def given(rows: int) -> str:
     return "\n".join([lines[0], *[line for line in lines[1:] if ",check" not in line][:rows]]) + "\n"
 
 
-def test_too_little_control_is_the_geometry(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    code, out, err = run(capsys, small(tmp_path, given(2)), *BUNDLE)
-    assert (code, out) == (3, "")
-    assert "neither control nor camera positions" in err
-
-
-def test_an_unknown_parameter_is_the_project(capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = run(capsys, PROJECT, *BUNDLE, "--set", "processing.self_calibration=[k4]")
-    assert code == 2
-    assert "`k4` is not known" in err
-
-
-def test_a_missing_table_of_positions_is_the_project(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    section = "camera_positions: {file: gnss.csv, crs: EPSG:32633, axes: [east, north, up], sigma: [1, 1, 1]}\n"
-    code, _, err = run(capsys, small(tmp_path, given(20), section), *BUNDLE)
-    assert code == 2
-    assert "camera_positions.file" in err
-
-
-@pytest.mark.slow
-def test_a_tolerance_that_is_not_kept(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = run(capsys, PROJECT, *BUNDLE, "--set", "tolerances.check_rms_xy=0.01", "--quiet")
-    assert code == 1
-    assert out.startswith("FAILED")
-
-
-def test_a_free_network_from_the_command_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_free_network_from_the_command_line(call: Call, tmp_path: Path) -> None:
     path = small(tmp_path, given(20).replace(",control", ",check") if ",control" in given(20) else given(0))
-    code, out, _ = run(capsys, path, *BUNDLE, "--format", "json")
+    code, out, _ = call("run", path, *BUNDLE, "--format", "json")
     document = json.loads(out)
     assert code == 0
     assert document["bundle"]["free_network"] is True
@@ -246,13 +182,13 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_simulated_project_with_positions_from_end_to_end(
-    simulated: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    simulated: Path, call: Call, capsys: Capture, tmp_path: Path
 ) -> None:
     """Everything a run can write, of a bundle; the positions take part and the project checks clean."""
     assert main(["check", str(simulated), *BUNDLE]) == 0
     capsys.readouterr()
     arguments = (str(simulated), *BUNDLE, "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "trace.txt"))
-    code, _, _ = run(capsys, *arguments)
+    code, _, _ = call("run", *arguments)
     assert code == 0
     document = read_result(str(tmp_path / "out" / "result.json"))
     assert document["bundle"]["observations"]["position"] == 3 * 12
@@ -261,16 +197,14 @@ def test_a_simulated_project_with_positions_from_end_to_end(
     assert (tmp_path / "trace.txt").read_text(encoding="utf-8").startswith("Trace: block\n")
     resolved = tmp_path / "out" / "project.resolved.yaml"
     (simulated.parent / "again.yaml").write_bytes(resolved.read_bytes())
-    again = json.loads(run(capsys, str(simulated.parent / "again.yaml"), "--format", "json")[1])
+    again = json.loads(call("run", str(simulated.parent / "again.yaml"), "--format", "json")[1])
     assert again["points"] == plain_of(document["points"])
 
 
 @pytest.mark.slow
-def test_the_photos_of_a_result_are_orientations(
-    simulated: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_the_photos_of_a_result_are_orientations(simulated: Path, call: Call, capsys: Capture, tmp_path: Path) -> None:
     """photos.csv read again as approximate orientations gives the frame of a network without control."""
-    assert run(capsys, str(simulated), "-o", str(tmp_path), "--quiet")[0] == 0
+    assert call("run", str(simulated), "-o", str(tmp_path), "--quiet")[0] == 0
     text = simulated.read_text(encoding="utf-8")
     section = (
         f'orientations:\n  file: {tmp_path / "photos.csv"}\n  crs: "EPSG:32633"\n  axes: [east, north, up]\n'
@@ -280,7 +214,7 @@ def test_the_photos_of_a_result_are_orientations(
     path.write_text(text[: text.index("control:")] + section, encoding="utf-8")
     assert main(["check", str(path)]) == 0
     capsys.readouterr()
-    code, out, _ = run(capsys, str(path), "--format", "json")
+    code, out, _ = call("run", str(path), "--format", "json")
     document = json.loads(out)
     assert code == 0
     assert document["bundle"]["free_network"] is True

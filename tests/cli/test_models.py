@@ -17,6 +17,8 @@ from tests.loops import nonempty
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 
@@ -27,7 +29,7 @@ def project(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_everything_that_is_written(project: Path, capsys: Capture) -> None:
     folder = project.parent.parent
     assert main(["run", str(project), "-o", str(folder / "a"), "--html"]) == 0
     assert main(["run", str(project), "-o", str(folder / "b"), "--quiet"]) == 0
@@ -50,15 +52,6 @@ def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.slow
-def test_a_changed_coordinate_is_seen_by_compare(project: Path) -> None:
-    folder = project.parent.parent
-    assert main(["run", str(project), "-o", str(folder / "a"), "--quiet"]) == 0
-    again = ["run", str(project), "-o", str(folder / "b"), "--quiet", "--set", "models.sigma=[0.02, 0.02, 0.03]"]
-    assert main(again) == 0
-    assert main(["compare", str(folder / "b" / "result.json"), str(folder / "a" / "result.json")]) == 1
-
-
-@pytest.mark.slow
 def test_batch_and_check_take_models(project: Path) -> None:
     assert main(["check", str(project)]) == 0
     assert main(["batch", str(project), "-o", str(project.parent / "all"), "-j", "1"]) == 0
@@ -76,7 +69,7 @@ def test_the_trace_shows_the_way_to_the_ground(project: Path) -> None:
     assert "bsolute orientation" in (project.parent / "trace.txt").read_text(encoding="utf-8")
 
 
-def test_exit_codes(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_exit_codes(project: Path, capsys: Capture) -> None:
     assert main(["run", str(project), "--quiet", "--set", "processing.adjustment=polynomial"]) == 0
     assert main(["run", str(project), "--quiet", "--set", "processing.refraction=true"]) == 2
     assert "needs image coordinates" in capsys.readouterr().err

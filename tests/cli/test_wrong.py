@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.cli.main import main
 from photostrip.formats.text import writing
 from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, sample
@@ -23,27 +22,21 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from tests.calls import Call
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 WRONG = [*((FILES, *case) for case in ONE_FAULT), *((MARKED_FILES, *case) for case in MARKS)]
 
 
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = main([str(argument) for argument in arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
 @pytest.mark.parametrize("case", WRONG[::5], ids=lambda case: f"{case[2]!r:.20}-{case[3]!r:.20}")
-def test_a_wrong_value_ends_with_2_and_its_words(
-    tmp_path: Path, case: tuple[Any, ...], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_value_ends_with_2_and_its_words(tmp_path: Path, case: tuple[Any, ...], call: Call) -> None:
     files, file, old, new, place = case[:5]
     words = case[5:]
     project = sample(tmp_path, files)
     project.change(file, old, new)
     out = tmp_path / "out"
-    code, printed, err = call(capsys, "run", tmp_path / "project.yaml", "-o", out)
+    code, printed, err = call("run", tmp_path / "project.yaml", "-o", out)
     lines = err.replace(f"{tmp_path}/", "").splitlines()
     assert (code, printed) == (2, "")
     assert all(line.startswith("error: ") for line in nonempty(lines))
@@ -51,7 +44,7 @@ def test_a_wrong_value_ends_with_2_and_its_words(
         line for line in lines if line.startswith(f"error: {place}") and all(word in line for word in nonempty(words))
     ]
     assert not out.exists()
-    code, printed, _ = call(capsys, "check", tmp_path / "project.yaml", "--format", "json")
+    code, printed, _ = call("check", tmp_path / "project.yaml", "--format", "json")
     findings = [each for each in json.loads(printed)["projects"][0]["findings"] if each["severity"] == "error"]
     assert code == 2
     number = int((place.split(":")[1:2] or ["0"])[0] or 0)
@@ -76,12 +69,12 @@ GEOMETRY = [
 
 @pytest.mark.parametrize(("file", "harm", "words"), GEOMETRY)
 def test_weak_geometry_ends_with_3(
-    tmp_path: Path, file: str, harm: Callable[[list[str]], list[str]], words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, file: str, harm: Callable[[list[str]], list[str]], words: str, call: Call
 ) -> None:
     path = write_project(tmp_path / "p", spec())
     table = path.parent / file
     table.write_text("\n".join(harm(table.read_text(encoding="utf-8").splitlines())) + "\n", encoding="utf-8")
-    code, out, err = call(capsys, "run", path, "-o", tmp_path / "out")
+    code, out, err = call("run", path, "-o", tmp_path / "out")
     assert (code, out) == (3, "")
     assert err.startswith("error: ")
     assert words in err
@@ -89,42 +82,36 @@ def test_weak_geometry_ends_with_3(
 
 
 @pytest.mark.parametrize("east", ["43520059", "1e15"])
-def test_a_wild_coordinate_is_told_in_its_row_and_not_as_another_crs(
-    tmp_path: Path, east: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wild_coordinate_is_told_in_its_row_and_not_as_another_crs(tmp_path: Path, east: str, call: Call) -> None:
     path = write_project(tmp_path / "p", spec())
     table = path.parent / "control.csv"
     rows = [row.split(",") for row in table.read_text(encoding="utf-8").splitlines()]
     rows[3][1] = east
     table.write_text("\n".join(map(",".join, rows)) + "\n", encoding="utf-8")
-    code, _, err = call(capsys, "run", path)
+    code, _, err = call("run", path)
     assert code == 2
     first, *others = err.splitlines()
     assert first == f"error: {table}:4: point {rows[3][0]}: outside the domain of EPSG:32633"
     assert not any("P402" in line or "P403" in line for line in others)
 
 
-def test_a_cause_in_the_data_is_told_before_what_comes_of_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_cause_in_the_data_is_told_before_what_comes_of_it(tmp_path: Path, call: Call) -> None:
     path = write_project(tmp_path / "p", spec())
     order = ("--set", "strips[0].photos=[1001, 1003, 1002, 1004, 1005]")
-    code, _, err = call(capsys, "run", path, *order)
+    code, _, err = call("run", path, *order)
     assert code == 3
     first, second = err.splitlines()
     assert "P201 strip A: photos 1003 and 1002 are listed in the wrong order" in first
     assert second.startswith("error: relative orientation of photos 1001 and 1003")
-    _, printed, _ = call(capsys, "run", path, *order, "--format", "json")
+    _, printed, _ = call("run", path, *order, "--format", "json")
     assert json.loads(printed)["findings"][0]["code"] == "P201"
 
 
 @pytest.mark.parametrize(("old", "new"), [("unit: mm", "unti: mm"), ("observations:", "observatons:")])
-def test_a_misspelled_key_is_not_missing_besides(
-    tmp_path: Path, old: str, new: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_misspelled_key_is_not_missing_besides(tmp_path: Path, old: str, new: str, call: Call) -> None:
     path = write_project(tmp_path / "p", spec())
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    code, _, err = call(capsys, "run", path)
+    code, _, err = call("run", path)
     assert code == 2
     (line,) = err.splitlines()
     assert line.endswith(f"is not known; did you mean `{old.partition(':')[0]}`?")
@@ -140,24 +127,14 @@ def test_a_misspelled_key_is_not_missing_besides(
 )
 @pytest.mark.parametrize("command", ["run", "check"])
 def test_a_file_for_another_command_is_told_as_such(
-    tmp_path: Path, command: str, key: str, words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, command: str, key: str, words: str, call: Call
 ) -> None:
     file = tmp_path / "a.yaml"
     file.write_text(f"{key}: 1\nname: a\n", encoding="utf-8")
-    code, out, err = call(capsys, command, file)
+    code, out, err = call(command, file)
     assert code == 2
     (line,) = (line for line in (out + err).splitlines() if line.startswith("error: "))
     assert f"{key}: this is {words}" in line
-
-
-@pytest.mark.slow
-def test_a_tolerance_that_is_not_kept_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = write_project(tmp_path / "p", spec())
-    assert call(capsys, "run", path, "--set", "tolerances.check_rms_xy=1e-6", "-o", tmp_path / "out")[0] == 1
-    assert (tmp_path / "out" / "result.json").exists()
-    code, out, _ = call(capsys, "run", path, "--set", "tolerances.check_rms_xy=1e-6", "--format", "github")
-    assert code == 1
-    assert out.startswith("::error title=photostrip tolerance::tolerances.check_rms_xy: ")
 
 
 # ------------------------------------------------------------------------------------ files as such, in one form
@@ -203,18 +180,18 @@ HARMS = [
 @pytest.mark.parametrize("name", ["project.yaml", "preset.yaml", "observations.csv", "fiducials.csv", "control.csv"])
 @pytest.mark.parametrize(("harm", "kind", "words"), HARMS)
 def test_every_file_is_refused_in_the_same_words(
-    tmp_path: Path, name: str, harm: Callable[[Path], None], kind: str, words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, name: str, harm: Callable[[Path], None], kind: str, words: str, call: Call
 ) -> None:
     project = sample(tmp_path, MARKED_FILES | {"preset.yaml": "photostrip: 1\n"})
     project.change("project.yaml", "name: sample", "name: sample\nextends: preset.yaml")
     harm(tmp_path / name)
-    code, printed, _ = call(capsys, "check", tmp_path / "project.yaml", "--format", "json")
+    code, printed, _ = call("check", tmp_path / "project.yaml", "--format", "json")
     findings = json.loads(printed)["projects"][0]["findings"]
     found = [each for each in findings if each["code"] == kind]
     assert code == 2
     assert len(found) == 1
     assert (found[0]["line"] > 0) == (name != "project.yaml")  # a file that another one names is told where it is named
-    line = next(each for each in call(capsys, "run", tmp_path / "project.yaml")[2].splitlines() if words in each)
+    line = next(each for each in call("run", tmp_path / "project.yaml")[2].splitlines() if words in each)
     assert line.startswith(f"error: {tmp_path}/project.yaml:")
 
 
@@ -244,12 +221,12 @@ def test_every_command_refuses_its_file_in_the_same_words(
     harm: Callable[[Path], None],
     kind: str,
     words: str,
-    capsys: pytest.CaptureFixture[str],
+    call: Call,
 ) -> None:
     path = tmp_path / "file"
     path.write_text(PROJECT, encoding="utf-8")
     harm(path)
-    code, out, err = call(capsys, command, path, *options)
+    code, out, err = call(command, path, *options)
     assert (code, out) == (2, "")
     if (command, harm) == ("report", folder):  # a folder stands for the result.json in it
         assert err.startswith(f"error: {path}/result.json: does not exist")
@@ -261,7 +238,7 @@ def test_every_command_refuses_its_file_in_the_same_words(
 
 @pytest.mark.parametrize("form", ["text", "json", "github"])
 def test_a_full_disk_takes_the_same_form(
-    tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch, call: Call
 ) -> None:
     path = write_project(tmp_path / "p", spec())
 
@@ -269,7 +246,7 @@ def test_a_full_disk_takes_the_same_form(
         raise OSError(errno.ENOSPC, "No space left on device", str(self))
 
     monkeypatch.setattr(writing, "_write", full)
-    code, out, err = call(capsys, "run", path, "-o", tmp_path / "out", "--format", form)
+    code, out, err = call("run", path, "-o", tmp_path / "out", "--format", form)
     assert code == 2
     assert "no space left on device" in (out + err).lower()
     if form == "json":

@@ -14,6 +14,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 FOLDER = ROOT / "sample_data/simulated-20"
@@ -83,7 +85,7 @@ def test_plans_are_those_of_the_command(
     kind: photostrip.planning.PlanKind,
     overrides: dict[str, Any],
     keys: list[str],
-    capsys: pytest.CaptureFixture[str],
+    capsys: Capture,
 ) -> None:
     found = photostrip.plan(kind, **overrides)
     options = [f"--set={key}" for key in keys]

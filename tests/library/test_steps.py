@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from tests.calls import Capture
+
 F = 153.0
 NOISE = {"image": {"sigma_um": 0}, "control": {"noise": [0, 0, 0]}}
 
@@ -114,7 +116,7 @@ def test_three_photos_make_a_strip(truth: Truth) -> None:
     assert np.abs(departures).max() < 1e-9
 
 
-def test_a_strip_is_formed_at_once(truth: Truth, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_strip_is_formed_at_once(truth: Truth, tmp_path: Path, capsys: Capture) -> None:
     seen = [(photo, name) for photo in range(3) for name in truth.common(photo)]
     ids = list(dict.fromkeys(name for _, name in seen))
     xy = np.array([truth.image(photo, [name])[0] for photo, name in seen])
@@ -230,7 +232,7 @@ def test_the_bundle_starts_from_the_strip(truth: Truth, flown: Flown) -> None:
         steps.bundle(flown.rays, F, ground=flown.given[:2])
 
 
-def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: Capture) -> None:
     command, found = flown.command(tmp_path), steps.bundle(flown.rays, F, ground=flown.given)
     assert call(*command, "--format", "json") == 0
     out = capsys.readouterr().out
@@ -279,7 +281,7 @@ def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: pytest.Ca
 def test_a_bundle_that_cannot_be_is_refused(
     flown: Flown,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Capture,
     file: str,
     lines: list[str],
     code: int,
@@ -375,7 +377,7 @@ def values(out: str) -> dict[str, float]:
     return {each["name"]: each["value"] for each in json.loads(out)["values"]}
 
 
-def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: Capture) -> None:
     ids = truth.common(0, 1)
     images = truth.image(0, ids), truth.image(1, ids)
     pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, *images)
@@ -444,7 +446,7 @@ def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: py
     np.testing.assert_allclose(places @ truth.rotations[0].T + truth.centers[0], truth.xyz(ids), atol=2e-4)
 
 
-def traced(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, dict[str, NDArray[np.float64]]]:
+def traced(capsys: Capture, *arguments: str) -> dict[str, dict[str, NDArray[np.float64]]]:
     """Give the tables of the trace of a step: columns by name."""
     assert call(*arguments, "--trace", "--format", "json") == 0
     tables = {key: each for key, each in json.loads(capsys.readouterr().out).items() if key.startswith("trace_")}
@@ -456,7 +458,7 @@ def traced(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, dic
     }
 
 
-def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, capsys: Capture) -> None:
     ids = truth.common(0, 1)
     rng = np.random.default_rng(2)
     left, right = (truth.image(photo, ids) + rng.normal(0, 0.005, (len(ids), 2)) for photo in (0, 1))
@@ -502,7 +504,7 @@ def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, caps
     np.testing.assert_allclose(rows["X'"] - rows["X-Xm"], fitted.residuals[:, 0], atol=1e-9)
 
 
-def test_traces_of_the_other_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_traces_of_the_other_steps(tmp_path: Path, capsys: Capture) -> None:
     marks = table(
         tmp_path / "marks.csv",
         "mark x y x_photo y_photo",
@@ -556,14 +558,14 @@ def test_traces_of_the_other_steps(tmp_path: Path, capsys: pytest.CaptureFixture
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], lines: list[str], options: list[str], code: int, message: str
+    tmp_path: Path, capsys: Capture, lines: list[str], options: list[str], code: int, message: str
 ) -> None:
     (tmp_path / "pair.csv").write_text("\n".join(lines), encoding="utf-8")
     assert call("relative", str(tmp_path / "pair.csv"), F153, *options) == code
     assert message in capsys.readouterr().err
 
 
-def test_a_missing_table_and_wrong_numbers_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_table_and_wrong_numbers_are_told(tmp_path: Path, capsys: Capture) -> None:
     assert call("interior", str(tmp_path / "none.csv")) == 2
     assert "does not exist" in capsys.readouterr().err
     (tmp_path / "points.csv").write_text("point,x,y\n1,2,3\n", encoding="utf-8")
@@ -571,9 +573,7 @@ def test_a_missing_table_and_wrong_numbers_are_told(tmp_path: Path, capsys: pyte
     assert "--set: k[1]: `nan` is not a measured value" in capsys.readouterr().err
 
 
-def test_the_coefficients_of_an_interior_orientation_can_be_used_as_printed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_coefficients_of_an_interior_orientation_can_be_used_as_printed(tmp_path: Path, capsys: Capture) -> None:
     measured = np.array([[100.012, -99.982], [-111.97, -100.01], [-112.0, 112.03], [100.03, 112.05]])
     calibrated = np.array([[106.0, -106.0], [-106.0, -106.0], [-106.0, 106.0], [106.0, 106.0]])
     marks = table(tmp_path / "marks.csv", "mark x y x_photo y_photo", ["1", "2", "3", "4"], measured, calibrated)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import Result, StripResult
+    from tests.calls import Capture
 
     Floats = NDArray[np.float64]
 
@@ -125,7 +126,7 @@ def differences(found: Result, *, check: bool) -> Floats:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
-def test_the_command_adjusts_a_sample(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_command_adjusts_a_sample(name: str, capsys: Capture, tmp_path: Path) -> None:
     assert main(["run", str(DATA / name / "project.yaml"), "-o", str(tmp_path)]) == 0
     assert name in capsys.readouterr().out
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["name"] == name

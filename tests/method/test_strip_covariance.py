@@ -10,9 +10,9 @@ import pytest
 
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import Similarity
+from photostrip.pipeline.formed_photos import form_strip
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.photos import form_strip
 from photostrip.points import locate
 from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate
 from tests.simulated import inputs_of

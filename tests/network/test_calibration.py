@@ -9,9 +9,9 @@ import pytest
 
 from photostrip.camera import Camera
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of
 from photostrip.network.observations import corrections
 from photostrip.network.problem import ASKED, CALIBRATION
+from photostrip.network.reliability import cofactors_of
 from photostrip.simulation import Flight, Spec, simulate
 from tests.simulated_bundle import problem_of
 

@@ -11,8 +11,8 @@ import pytest
 
 from photostrip.geometry.rotation import from_vector
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of
 from photostrip.network.problem import AttitudeObservations, BundleProblem, ControlObservations, PositionObservations
+from photostrip.network.reliability import cofactors_of
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Points, Spec, simulate
 from tests.bundles import dense

@@ -11,8 +11,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of, coordinates_of, joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ModelObservations, StartValues
+from photostrip.network.reliability import cofactors_of, coordinates_of, joint_cofactors
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from photostrip.network.adjustment import solve
-from photostrip.network.cofactors import cofactors_of
+from photostrip.network.reliability import cofactors_of
 from tests.peer import FILE, SHAPES, problem
 from tests.source_tree import ROOT
 

@@ -11,7 +11,7 @@ from photostrip.errors import InputError
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
-from photostrip.strip.relative_orientation.orientation import RelativeSettings as Relative
+from photostrip.strip.relative_orientation import RelativeSettings as Relative
 from tests.strips import Flown, control_points, fly, project
 
 WRONG = ("105", "p4_1")

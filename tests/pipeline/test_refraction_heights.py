@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from photostrip.pipeline.frames import tie_ground_frames
-from photostrip.pipeline.image_coordinates import heights_of, orient_interior
+from photostrip.pipeline.frames import orient_interior, tie_ground_frames
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.run import triangulate
+from photostrip.pipeline.run import heights_of, triangulate
 from photostrip.simulation import simulate
 from tests.results import spec
 from tests.simulated import inputs_of

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.planning.deformation import parallax_error
-from photostrip.strip.relative_orientation import standard_points
+from photostrip.strip import relative_orientation
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -131,4 +131,6 @@ def orientation_factors(xy: ArrayLike, focal: float, width: float, base: float) 
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    return np.asarray(np.einsum("...i,ij,...j->...", rows, standard_points.cofactors(focal, width, base), rows), float)
+    return np.asarray(
+        np.einsum("...i,ij,...j->...", rows, relative_orientation.cofactors(focal, width, base), rows), float
+    )

@@ -14,7 +14,7 @@ from photostrip.planning.screening import (
     spoiled,
     standard_pairs,
 )
-from photostrip.strip.relative_orientation.orientation import orient_unchecked
+from photostrip.strip.relative_orientation import orient_unchecked
 from tests.loops import nonempty
 
 
@@ -25,7 +25,7 @@ def test_the_published_rates() -> None:
     rates = 100 * np.array([found.parallax, found.later, found.missed])
     assert rates == pytest.approx([51.9, 41.7, 6.4], abs=3.0)
     assert rates.sum() == pytest.approx(100.0)
-    assert 44 * found.lost == pytest.approx(1.1, abs=0.7)
+    assert 44 * (found.beside + found.instead) == pytest.approx(1.1, abs=0.7)
 
 
 def test_effects_are_what_orienting_again_finds() -> None:
@@ -47,7 +47,7 @@ def test_effects_are_what_orienting_again_finds() -> None:
 def test_without_a_search_every_error_stays_and_turns_its_pair() -> None:
     spec = ScreeningSpec(methods=("none",), repetitions=1, seed=4)
     (found,) = screening_experiment(spec).methods
-    assert (found.missed, found.lost) == (1.0, 0.0)
+    assert (found.missed, found.beside, found.instead) == (1.0, 0.0, 0.0)
     rng = np.random.default_rng(4)
     pairs = standard_pairs(rng, spec.models, spec.layout)
     errors = experiment_errors(rng, spec)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from photostrip.plausibility import flight
+from photostrip.plausibility.given_points import slip
 from photostrip.plausibility.ids import TiesOfStrips, odd_ties
-from photostrip.plausibility.slips import slip
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SAMPLE = Path("sample_data/simulated-20")
 # modules that tie frames of a project
-PLACES = ("project.loading", "pipeline.frames", "pipeline.plausibility.gate", "pipeline.plausibility.given_cameras")
+PLACES = ("project.loading", "pipeline.frames", "pipeline.gate", "pipeline.given_on_ground")
 ED50 = ("control[0].crs=EPSG:23030", "output.crs=EPSG:32630")
 
 

@@ -10,13 +10,11 @@ import pytest
 
 from photostrip.formats.text.findings import Findings
 from photostrip.pipeline.inputs import Settings
-from photostrip.project.editors import KINDS, schema_of
+from photostrip.project.editors import KINDS, keys_page, schema_of
 from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances
+from photostrip.project.reading import Node, Place, checked, homes, parse
 from photostrip.project.sections import Section
-from photostrip.project.yaml.reading import checked, homes
-from photostrip.project.yaml.tree import Node, Place, parse
 from tests.loops import nonempty
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -148,32 +146,10 @@ def test_descriptions_are_found_through_lists_and_names() -> None:
     assert found["control[0].file"].expected.startswith("table `point,x,y,z")
 
 
-def pages() -> str:
-    """Give the page of the project file, and that of the one block that has its own."""
-    return "".join((ROOT / "docs" / "files" / f"{name}.md").read_text(encoding="utf-8")
-                   for name in ("project", "cameras-in-pixels"))  # fmt: skip
-
-
-def test_the_page_of_the_project_file_names_every_key() -> None:
-    page = pages()
-    assert [name for name, _ in every_key() if f"`{name}`" not in page] == []
-
-
-def test_the_page_tells_every_default_and_unit() -> None:
-    lines = pages().splitlines()
-    for name, each in nonempty(every_key()):
-        rows = [line for line in lines if line.startswith("| ") and f"`{name}`" in line.split(" | ")[0]]
-        assert rows, name
-        words = [str(word) for word in each.get("enum", [])]
-        default = each.get("default")
-        if isinstance(default, str | int | float):
-            words.append(
-                str(default).lower()
-                if isinstance(default, bool)
-                else f"{default:.10g}"
-                if isinstance(default, float)
-                else str(default)
-            )
-        if "unit" in each:
-            words.append(each["unit"])
-        assert any(all(word in row for word in words) for row in rows), (name, words)
+def test_the_page_of_keys_has_every_one_with_default_and_unit() -> None:
+    rows = keys_page("project").splitlines()
+    shown = {(row.split("`")[1], row.split(" | ")[2].removesuffix(" |")) for row in rows if row.startswith("| `")}
+    assert {(name, each["description"]) for name, each in every_key()} == shown
+    assert "| `grubbs_alpha` | 0.05 | Probability of rejecting a good point of a pair without gross errors |" in rows
+    assert "| `variance_components` | false |" in keys_page("project")
+    assert "| `principal_distance` | required | Principal distance [mm] |" in rows

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.strip.lens_distortion import ideal_from_image
+from photostrip.strip.corrections import ideal_from_image
 from tests.project.samples import sample
 
 if TYPE_CHECKING:

@@ -313,7 +313,7 @@ def test_check_tells_models_whose_link_no_equation_gives(tmp_path: Path, monkeyp
     def singular(*_: object) -> None:
         raise np.linalg.LinAlgError("Singular matrix")
 
-    monkeypatch.setattr("photostrip.strip.model_links.np.linalg.inv", singular)
+    monkeypatch.setattr("photostrip.strip.linked_models.np.linalg.inv", singular)
     sample(tmp_path, FILES)
     (fault,) = check_project(tmp_path / P).faults
     assert fault.code == "singular"

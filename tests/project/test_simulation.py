@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from photostrip import simulation
 from photostrip.camera import Distortion
 from photostrip.errors import InputError
 from photostrip.project.simulation import Specification, load_specification
@@ -26,8 +24,6 @@ from photostrip.simulation import (
     Spec,
     Terrain,
 )
-from tests.loops import nonempty
-from tests.pages import blocks
 from tests.source_tree import ROOT
 
 EXAMPLES = sorted((ROOT / "configs/simulate").glob("*.yaml"))
@@ -225,31 +221,6 @@ def test_the_number_of_the_schema_is_asked_for(tmp_path: Path) -> None:
 def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
     text = "photostrip_simulation: 1\nsed: 1\nflight: {photos: x}\nimage: {unit: inch}\n"
     assert [message.split(": ")[1] for message in messages(tmp_path, text)] == ["sed", "flight.photos", "image.unit"]
-
-
-def keys(part: type) -> list[str]:
-    """Every key of a specification."""
-    found = []
-    for each in fields(part):
-        inner = getattr(simulation, {"gross_errors": "GrossError"}.get(each.name, each.name.capitalize()), None)
-        found.append(each.name)
-        if is_dataclass(inner) and isinstance(inner, type) and each.name != "camera":
-            found += keys(inner)
-    return found
-
-
-def test_the_page_has_every_key_with_its_default(tmp_path: Path) -> None:
-    files = {block.option("file"): block.lines for block in blocks(ROOT / "docs/simulate.md")}
-    for name, lines in nonempty(files.items()):
-        (tmp_path / (name or "none")).write_text("\n".join(lines), encoding="utf-8")
-    assert load_specification(tmp_path / "defaults.yaml").spec == Spec()
-    more = load_specification(tmp_path / "more.yaml").spec
-    assert (more.film, more.gnss, more.gross_errors) == (Film(), Gnss(), (GrossError("image"),))
-    assert load_specification(tmp_path / "plotter.yaml").spec.models == Models()
-    shown = [line for name in ("defaults.yaml", "more.yaml", "plotter.yaml") for line in files[name]]
-    named = {found[1] for line in shown if (found := re.match(r"[ -]*(?:# )?(\w+):", line))}
-    assert len(keys(Spec)) > 60
-    assert [key for key in keys(Spec) if key not in named] == []
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)

@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.project.directions import CamerasFile
-from photostrip.project.phototheodolites import known_presets, own_presets
-from photostrip.project.survey import load_survey
-from photostrip.project.yaml.reading import read_keys
+from photostrip.project.reading import read_keys
+from photostrip.project.terrestrial import CamerasFile, known_presets, load_survey, own_presets
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write

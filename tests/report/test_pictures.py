@@ -135,7 +135,7 @@ def test_points_that_findings_name_have_a_ring_and_their_id() -> None:
 
 def test_parallaxes_have_the_mean_of_their_zone() -> None:
     document = case().document
-    sizes = document["parallaxes"].where(used=True, zone=1)["q_um"]
+    sizes = document["residuals"].where(zone=1)["q_um"]
     assert f"zone 1, left centre: {np.mean(sizes):+.1f} ± " in drawn(document, "parallaxes")
 
 

@@ -101,7 +101,7 @@ def test_no_line_is_wider_than_the_page(frame: str, width: int) -> None:
 def test_an_incomplete_file_is_refused_in_words(key: str) -> None:
     document = json.loads(to_json(case("projected").document))
     del document[key]
-    if key in {"covariances", "polynomials", "precision"}:  # not every project has them
+    if key in {"correlations", "polynomials", "precision"}:  # not every project has them
         assert reported(document)
     else:
         with pytest.raises(InputError, match=rf"result\.json: ({key}: is missing|has no key `{key}`)"):

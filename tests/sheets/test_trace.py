@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from tests.calls import Capture
     from tests.results import Case
 
     Document = dict[str, Any]
@@ -264,15 +265,6 @@ def test_the_preset_for_teaching_gives_a_trace_in_gon(tmp_path: Path, ending: st
         assert "gon" in text
 
 
-def test_an_ending_that_is_not_known_is_refused_before_the_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    project = write_project(tmp_path, spec())
-    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "t.pdf")]) == 2
-    assert "--trace" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 AS_PRINTED = f"extends: {ROOT / 'configs/as-printed.yaml'}\n"
 FIRST = "    first_photo: {angles: [2.0, -3.0, 12.0], unit: gon, base: 92.0}\n"
 
@@ -287,12 +279,12 @@ def as_printed(folder: Path, *options: str) -> Document:
 
 
 @pytest.mark.slow
-def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: Capture) -> None:
     capsys.readouterr()
     document = as_printed(tmp_path)
     assert document["departures"] == []
-    usual = departures_of(Settings())
-    assert [subject for subject, *_ in usual] == [choice.subject for choice in CHOICES]
+    usual = departures_of(case("projected").result)
+    assert [subject for subject, *_ in usual] == [choice.subject for choice in CHOICES if choice.key != "adjustment"]
     assert "processing.intersection: left" in [key for *_, key in usual]
     strip = document["strips"][0]
     first = strip["chain"][0]
@@ -313,6 +305,33 @@ def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: pytest
             found = [point[axis] for axis in "XYZ"]
             assert found == pytest.approx(left["S"] + np.array([n * x1, n * y1, -n * 153.0]), abs=2e-4)
             assert point["N"] * right["k"] == pytest.approx(n, rel=2e-6)
+
+
+def test_a_cubic_that_the_control_does_not_carry_is_a_departure(tmp_path: Path) -> None:
+    """The settings ask for degree 3, three bands of control carry 2: told is what was done."""
+    project = write_project(tmp_path, spec(bands=3), AS_PRINTED)
+    file = tmp_path / "trace.json"
+    assert main(["run", str(project), "--quiet", "--trace", str(file)]) == 0
+    document = json.loads(file.read_text(encoding="utf-8"))
+    (departure,) = document["departures"]
+    assert departure["subject"] == "degree"
+    assert departure["here"] == "2 in plan, 2 in height (3 asked for)"
+    assert departure["key"] == "control at four distances along the strip"
+
+
+def test_base_frames_turn_what_relative_orientation_found() -> None:
+    """A = A_taunu A(alpha2', omega2', kappa2'), and the first column of A_taunu is the base."""
+    for name in CASES:
+        document = trace(name)
+        frames, pairs, chain = (document[key] for key in ("base_frames", "pairs", "chain"))
+        photos = {row["photo"]: row for row in chain}
+        for frame, pair in nonempty(zip(frames, pairs, strict=True)):
+            turn, right = (np.array(values(row, *MATRIX)).reshape(3, 3) for row in (frame, photos[frame["right"]]))
+            assert turn @ rotation(pair["alpha2"], pair["omega2"], pair["kappa2"]).as_matrix() == pytest.approx(
+                right, abs=1e-8
+            )
+            base = np.array(values(photos[frame["right"]], "BX", "BY", "BZ"))
+            assert turn[:, 0] == pytest.approx(base / np.linalg.norm(base), abs=1e-7)
 
 
 def test_a_pair_in_the_system_of_its_left_photo() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,6 +55,20 @@ def test_the_worked_examples(
     assert (round(found.horizontal, 2), round(found.vertical, 2)) == exact
     assert (round(found.printed_factor, 2), round(found.eq6, 2)) == (with_printed_factor, with_own_factor)
     assert abs(found.printed_factor - example.vertical) < 0.25  # the print rounds to half a second
+
+
+@pytest.mark.parametrize(("number", "by_eq4", "by_eq5"), [(0, 5.64, 5.53), (1, 11.08, 9.68)])
+def test_eq4_as_printed_has_terms_that_eq5_drops(number: int, by_eq4: float, by_eq5: float) -> None:
+    example = EXAMPLES[number]
+    found = worked(example)
+    assert (round(found.eq4, 2), round(found.eq5, 2)) == (by_eq4, by_eq5)
+
+    def beta(x: float, z: float, f: float) -> float:
+        return math.atan(z / f * math.sqrt(1 + (x / f) ** 2))  # eq. 3 as printed
+
+    at, step = np.array([example.x, example.z, example.f]), 1e-4
+    slopes = [(beta(*(at + step * unit)) - beta(*(at - step * unit))) / (2 * step) for unit in np.eye(3)]
+    assert found.eq4 == pytest.approx(example.sigma * np.linalg.norm(slopes) * RHO, rel=1e-6)
 
 
 def test_required_accuracy_is_that_of_simulated_measurements() -> None:

@@ -9,9 +9,10 @@ from typing import Any
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.notes import Document
+from photostrip.result.derived import with_derived
 from photostrip.result.description import LEFT_OUT, SCHEMA
 from photostrip.result.reading import read
-from photostrip.result.table import Table, in_frame
+from photostrip.result.table import Table, in_frame, stored
 from photostrip.visible import visible_json
 
 LARGEST_RESULT = 1000 * MEGABYTE
@@ -31,7 +32,7 @@ def json_pieces(document: Document, *, ascii_only: bool = False) -> Iterator[str
 
 def _pieces(value: Any, indent: str, encode: Any) -> Iterator[str]:  # noqa: ANN401 (any part of a document)
     if isinstance(value, Table):
-        items: Any = ((name, value.values(name)) for name in value.columns)
+        items: Any = stored(value).items()
     elif isinstance(value, dict) and (not indent or _has_tables(value) or len(encode(value)) > LONGEST_LINE):
         items = value.items()
     elif isinstance(value, list) and value and isinstance(value[0], dict):  # rows of a document that has no tables
@@ -106,4 +107,4 @@ def checked(document: Any, file: str, lacking: Collection[str] = ()) -> Document
         whole = read(document, file, lacking=lacking)
     except RecursionError:
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
-    return in_frame(whole)
+    return in_frame(with_derived(whole))

@@ -52,7 +52,8 @@ def adjustment_of(document: Document) -> str:
     """Say how the points were adjusted, and who wanted it."""
     text = str(document["adjustment"])
     if text == "polynomial":
-        text = f"polynomial, degree {document['settings']['polynomial']['degree']}"
+        asked = document["settings"]["polynomial"]["degree"]
+        text = f"polynomial, degree {'by evidence' if asked == 'auto' else f'{asked} asked for'}"
     return f"{text}; chosen by `auto`" if document["settings"]["adjustment"] == "auto" else text
 
 

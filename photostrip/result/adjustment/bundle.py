@@ -25,8 +25,8 @@ from photostrip.statistics import TEST_LEVEL
 from photostrip.units import MICROMETRES
 
 OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
+SAME = 1e-3  # parts by which standard deviations that are taken for one may differ
 SHOWN = 10  # observations named as the weakest and as the worst
-RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")
 
 
 class GroupKind(NamedTuple):
@@ -92,6 +92,7 @@ def bundle_of(result: Result) -> Document:
         "reliability": {
             "power": settings.power,
             "noncentrality": shift[reliability.IMAGE],
+            **_image_sigma(found),
             "groups": Table.of_rows(
                 "bundle.reliability.groups",
                 (_group(group, shift[group.kind], written[group.kind]) for group in found.groups),
@@ -274,15 +275,23 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     found = result.bundle
     if found is None or result.model_strips:
         return residuals
-    shift = found.screened.limit.shifts(result.settings.bundle.power)[reliability.IMAGE]
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
-    values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
-    values = np.vstack([values, np.full(len(RELIABILITY), np.nan)])  # the last row: a ray that took no part
-    row_of = np.full(len(result.refined.observations), -1)
-    used = found.block.rows[found.screened.selection.images]
-    row_of[used] = np.arange(len(used))
-    at = row_of[np.concatenate([image.rows for image in images])]
-    return residuals.with_columns(**dict(zip(RELIABILITY, values[at].T, strict=True)))
+    columns = {"redundancy": group.redundancy} | ({} if _image_sigma(found) else {"sigma": group.sigma * MICROMETRES})
+    at = np.full(len(result.refined.observations), len(group.sigma))  # the last row: a ray that took no part
+    at[found.block.rows[found.screened.selection.images]] = np.arange(len(group.sigma))
+    at = at[np.concatenate([image.rows for image in images])]
+    values = {key: np.vstack([column, np.full(2, np.nan)])[at] for key, column in columns.items()}
+    units = {"redundancy": "", "sigma": "_um"}
+    return residuals.with_columns(
+        **{f"{key}_{axis}{units[key]}": of_key[:, k] for key, of_key in values.items() for k, axis in enumerate("xy")}
+    )
+
+
+def _image_sigma(found: Bundle) -> Document:
+    """Return the stated standard deviation of image coordinates, µm, where all have the same."""
+    sigma = found.screened.problem.images.sigma
+    same = not found.screened.problem.of_models and bool(np.ptp(sigma) <= SAME * sigma.max())
+    return {"image_sigma_um": float(sigma.max()) * MICROMETRES} if same else {}
 
 
 def _foremost(

@@ -9,15 +9,15 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.notes import Document
-from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import compare_with_given
+from photostrip.pipeline.precision import mean_points
 from photostrip.pipeline.results import Adjusted, Result, StripResult
 from photostrip.points import locate
 from photostrip.result.numbers import rms
 from photostrip.result.points.given import differences, of_used
 from photostrip.result.quantities import record
 from photostrip.result.table import Table
-from photostrip.strip.polynomial_terms import degree_of
+from photostrip.strip.polynomial import degree_of
 
 
 def classical_of(result: Result) -> Document:

@@ -46,7 +46,6 @@ def _junctions(strip: StripResult, ids: Sequence[str]) -> Table:
     columns = {
         "strip": strip.strip.id,
         "photo": photos[1:-1],
-        "photos": [list(photos[number : number + 3]) for number in range(count)],
         "points_used": np.bincount(joined.junction, joined.used, count).astype(np.intp),
         "points_rejected": left_out,
         "factor": joined.factor,

@@ -67,11 +67,11 @@ def links_of(result: Result) -> Table:
 
 
 def _links(result: Result, strip: StripResult) -> list[Document]:
-    from photostrip.strip.model_links import detectable
+    from photostrip.strip.linked_models import detectable
 
     formed, names = strip.of_models.formed, strip.of_models.strip.models
     links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved
-    from photostrip.strip.model_strip import far_ends
+    from photostrip.strip.linked_models import far_ends
 
     gap, far, smallest, found = discrepancies(strip), far_ends(formed), detectable(shared, links), []
     for number in range(shared.count):

@@ -8,17 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
-from photostrip.result.numbers import order_of
 from photostrip.result.table import Table
-from photostrip.strip.formed_strip import base_angles
-from photostrip.strip.pair_screening import SEARCHES, tested
+from photostrip.strip.pair_screening import SEARCHES, GlobalTest, residual_sigma, tested
 from photostrip.strip.pair_screening import stages as tests_of
-from photostrip.strip.pair_search import GlobalTest, residual_sigma
-from photostrip.strip.relative_orientation.orientation import Orientation, RelativeSettings
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.relative_orientation import ELEMENTS, MINIMUM_POINTS, RelativeSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +62,6 @@ def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) 
         "left": photos[:-1],
         "right": photos[1:],
         **_of_elements("elements", oriented.elements),
-        **{f"photo_system_{key}": column for key, column in _in_left_photo(oriented).items()},
         **_of_elements("sigmas", oriented.sigmas),
         "sigma0_um": 1000.0 * oriented.sigma0,
         "rms_parallax_um": 1000.0 * sums.rms,
@@ -95,52 +88,12 @@ def _of_elements(name: str, values: Floats) -> dict[str, Floats]:
     return {f"{name}_{element}": column for element, column in zip(ELEMENTS, np.degrees(values).T, strict=True)}
 
 
-def _in_left_photo(oriented: Orientation) -> dict[str, object]:
-    """Return base and right photo in the system of the left one: the elements that belong to two photos, [001]."""
-    base, rotation = oriented.relative
-    bx, by, bz = base.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = by / bx, bz / bx
-    tau, nu = np.degrees(base_angles(base))
-    angles = np.degrees(alpha_omega_kappa(rotation))
-    return {
-        "by_bx": slopes[0],
-        "bz_bx": slopes[1],
-        "tau": tau,
-        "nu": nu,
-        **dict(zip(("alpha", "omega", "kappa"), angles.T, strict=True)),
-    }
-
-
 def _detectable(strip: StripResult) -> Floats:
     """Largest of the smallest errors that can be found at the points of each pair, mm; NaN where one is never seen."""
     oriented = strip.of_photos.orientation
     size = np.where(oriented.used, strip.of_photos.screened.detectable, 0.0)
     worst = np.maximum.reduceat(np.nan_to_num(size, nan=0.0, posinf=np.inf), oriented.pairs.starts)
     return np.where(np.isfinite(worst), worst, np.nan)
-
-
-def parallaxes_of(result: Result, rank: Numbers) -> Table:
-    """Return the table ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
-    ids = result.refined.observations.point_ids
-    found = []
-    for strip in result.photo_strips:
-        oriented, screened, photos = strip.of_photos.orientation, strip.of_photos.screened, strip.strip.photos
-        order = order_of(oriented.pairs.pair, rank[oriented.point])
-        pair = oriented.pairs.pair[order]
-        columns = {
-            "strip": strip.strip.id,
-            "left": np.array(photos[:-1], object)[pair],
-            "right": np.array(photos[1:], object)[pair],
-            "point": np.array(ids, object)[oriented.point[order]],
-            "q_um": 1000.0 * oriented.parallax[order],
-            "used": oriented.used[order],
-            "zone": screened.zone[order],
-            "redundancy": np.where(oriented.used, oriented.redundancy, np.nan)[order],
-            "detectable_um": 1000.0 * screened.detectable[order],
-        }
-        found.append(Table.of("parallaxes", columns))
-    return Table.joined("parallaxes", found)
 
 
 def _parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:

@@ -21,8 +21,7 @@ from photostrip.result.numbers import Plain, natural, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT
 from photostrip.result.table import Table
 from photostrip.strip.control_screening import EITHER, EXCHANGED
-from photostrip.strip.formed_strip import model_points
-from photostrip.strip.scale_transfer import depths
+from photostrip.strip.formed_strip import depths, model_points
 from photostrip.units import MICROMETRES
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity

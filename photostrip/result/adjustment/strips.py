@@ -17,8 +17,7 @@ from photostrip.result.adjustment.junctions import PPM, along_the_strip, discrep
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import MATRIX
 from photostrip.result.table import Table
-from photostrip.strip.polynomial import Polynomial
-from photostrip.strip.polynomial_terms import degree_of
+from photostrip.strip.polynomial import Polynomial, degree_of
 
 
 def strip_of(result: Result, strip: StripResult) -> Document:

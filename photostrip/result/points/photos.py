@@ -15,7 +15,7 @@ from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.numbers import PER_RADIAN, order_of, to_decimals
 from photostrip.result.points.ground import coordinates
-from photostrip.result.points.precision import COVARIANCES, SIGMAS, centre_columns, photo_columns
+from photostrip.result.points.precision import CORRELATIONS, SIGMAS, centre_columns, photo_columns
 from photostrip.result.quantities import MATRIX, angle_decimals
 from photostrip.result.table import Table
 from photostrip.strip.resection import depths, project
@@ -89,16 +89,23 @@ def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
 
 
 def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Table:
-    """Return the table ``residuals``: image residuals photo by photo, points in natural order."""
+    """Return the table ``residuals``: image residuals and y parallaxes photo by photo, points in natural order."""
     observations, parts = result.refined.observations, []
+    parallax, zone = np.full(len(observations), np.nan), np.full(len(observations), np.nan)
+    for strip in result.photo_strips:
+        oriented = strip.of_photos.orientation
+        left = oriented.rows[oriented.used, 0]
+        parallax[left] = 1000.0 * oriented.parallax[oriented.used]
+        zone[left] = strip.of_photos.screened.zone[oriented.used]
     for image in images:
         columns = {
-            "strip": image.strip.id,
             "photo": np.array(image.strip.photos, object)[image.photo],
             "point": np.array(observations.point_ids, object)[observations.point[image.rows]],
             "vx_um": 1000.0 * image.residuals[:, 0],
             "vy_um": 1000.0 * image.residuals[:, 1],
             "used": image.used,
+            "q_um": parallax[image.rows],
+            "zone": zone[image.rows],
         }
         parts.append(Table.of("residuals", columns))
     return Table.joined("residuals", parts)
@@ -134,7 +141,7 @@ def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
 
 
 def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Document:
-    """Return the tables ``photos``, exterior orientations in the frame of the result, and ``covariances`` of these.
+    """Return the tables ``photos``, exterior orientations in the frame of the result, and ``correlations`` of these.
 
     They stand in flight order. Of photos whose strip is made of independent models the perspective centre alone is
     known.
@@ -145,12 +152,12 @@ def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Document:
         of_strips = zip(result.photo_strips, images, strict=False)
         parts = [_photos_of_strip(result, number, strip, image) for number, (strip, image) in enumerate(of_strips)]
         parts += _single_photos(result, images[len(result.photo_strips) :])
-    photos = [{key: column for key, column in part.items() if key not in COVARIANCES} for part in parts]
+    photos = [{key: column for key, column in part.items() if key not in CORRELATIONS} for part in parts]
     found = {"photos": Table.joined("photos", (Table.of("photos", part) for part in photos))}
-    if not all("c11" in part for part in parts):
+    if not all("c12" in part for part in parts):
         return found
-    known = [{"photo": part["id"], **{key: part[key] for key in COVARIANCES}} for part in parts]
-    return found | {"covariances": Table.joined("covariances", (Table.of("covariances", part) for part in known))}
+    known = [{"photo": part["id"], **{key: part[key] for key in CORRELATIONS}} for part in parts]
+    return found | {"correlations": Table.joined("correlations", (Table.of("correlations", part) for part in known))}
 
 
 def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Document:

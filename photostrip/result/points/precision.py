@@ -1,4 +1,4 @@
-"""Precision of a result: standard deviations, covariances and error ellipses in the axes of the output."""
+"""Precision of a result: standard deviations and correlations in the axes of the output."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
+from photostrip.result.derived import PLACES
 from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.given import Differences
 from photostrip.result.points.own_precision import chances, turned
@@ -19,8 +20,8 @@ from photostrip.result.table import Table
 from photostrip.statistics import chi2_quantile, normal_quantile, squares_p_value
 from photostrip.strip.fitted_strip import CheckErrors
 
-ROWS, COLUMNS = np.triu_indices(6)
-COVARIANCES = tuple(f"c{row + 1}{column + 1}" for row, column in zip(ROWS.tolist(), COLUMNS.tolist(), strict=True))
+ROWS, COLUMNS = np.triu_indices(6, 1)
+CORRELATIONS = tuple(f"c{row + 1}{column + 1}" for row, column in zip(ROWS.tolist(), COLUMNS.tolist(), strict=True))
 SIGMAS = ("sigma_x", "sigma_y", "sigma_z", "sigma_angle_1", "sigma_angle_2", "sigma_angle_3")
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(1 - OUTSIDE, 2))), "height": normal_quantile(1 - OUTSIDE / 2)}
@@ -36,59 +37,37 @@ def plan_and_height(level: Floats) -> Floats:
         return np.sqrt(np.column_stack([level[:, 0, 0] + level[:, 1, 1], level[:, 2, 2]]))
 
 
-def ellipses(level: Floats) -> tuple[Floats, Floats]:
-    """Return standard error ellipses in plan, from covariances along east, north and up.
-
-    Returns axes: (n, 2), semi-axes, the larger one first. The true point lies inside with a probability of 39 %, inside
-        the ellipse of 2.45 times the size with 95 %.
-    Returns azimuth: (n,), direction of the larger one, clockwise from north, radians, 0 to pi.
-    """
-    east, north, mixed = level[:, 0, 0], level[:, 1, 1], level[:, 0, 1]
-    middle, reach = (east + north) / 2, np.hypot((north - east) / 2, mixed)
-    with np.errstate(invalid="ignore"):
-        axes = np.sqrt(np.column_stack([middle + reach, np.maximum(middle - reach, 0.0)]))
-    return axes, np.arctan2(mixed, (north - east) / 2) / 2 % np.pi
-
-
 def point_columns(result: Result) -> Document:
-    """Return columns of ``points``: standard deviations, empty when unknown, covariances, error ellipse in plan."""
+    """Return columns of ``points``: standard deviations, empty when unknown, and correlations of the coordinates."""
     precision, level, frame = result.precision, result.level_covariances, result.output
     if precision is None or level is None:
         return dict.fromkeys(("sigma_x", "sigma_y", "sigma_z"))
     order = list(frame.order)
     covariances = (precision.points if frame.kind == "geocentric" else level)[:, order][:, :, order]
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    size, azimuth = ellipses(level)
+        correlations = covariances / (sigma[:, :, None] * sigma[:, None, :])
     return {
         **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("xyz")},
-        "cov_xy": covariances[:, 0, 1],
-        "cov_xz": covariances[:, 0, 2],
-        "cov_yz": covariances[:, 1, 2],
-        "ellipse_a": size[:, 0],
-        "ellipse_b": size[:, 1],
-        "ellipse_azimuth_deg": np.degrees(azimuth),
+        **{f"correlation_{axes}": correlations[:, k, j] for axes, (k, j) in PLACES.items() if k != j},
     }
 
 
 def photo_columns(result: Result, axes: Floats, rotations: Floats, given: Floats) -> Document:
-    """Return columns of ``photos``: standard deviations of centre and angles, and their covariances.
+    """Return columns of ``photos``: standard deviations of centre and angles, and their correlations.
 
     An angle's rows take the small rotation about the axes of the output to the angles of the system.
 
     axes, rotations: (m, 3, 3), axes of the output at the perspective centres, rows in the Cartesian frame; photo to
         those axes.
     given: (m, 6, 6), covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
-    Returns standard deviations of x, y, z in metres and of the angles in their exported unit; the upper triangle of the
-        covariances of x, y, z and the three angles.
+    Returns standard deviations of x, y, z in metres and of the angles in their exported unit, and correlations.
     """
     turn = np.zeros((len(axes), 6, 6))
     turn[:, :3, :3] = axes[:, list(result.output.order)]
     turn[:, 3:, 3:] = _rates(rotations, result.settings.angle_system) @ axes * PER_RADIAN[result.settings.angle_unit]
     covariances = turn @ given @ turn.transpose(0, 2, 1)
-    with np.errstate(invalid="ignore"):
-        sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    return dict(zip(SIGMAS, sigma.T, strict=True)) | _upper(covariances)
+    return _of_covariances(covariances)
 
 
 def centre_columns(result: Result, place: Floats, given: Floats | None) -> Document:
@@ -97,11 +76,15 @@ def centre_columns(result: Result, place: Floats, given: Floats | None) -> Docum
         return dict.fromkeys(SIGMAS)
     covariances = np.full((len(place), 6, 6), np.nan)
     covariances[:, :3, :3] = turned(given[:, :3, :3], result.output.axes_at(place)[:, list(result.output.order)])
-    return dict(zip(SIGMAS, np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)).T, strict=True)) | _upper(covariances)
+    return _of_covariances(covariances)
 
 
-def _upper(covariances: Floats) -> Document:
-    return dict(zip(COVARIANCES, covariances[:, ROWS, COLUMNS].T, strict=True))
+def _of_covariances(covariances: Floats) -> Document:
+    """Return standard deviations and correlations of x, y, z and the three angles."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+        correlations = covariances[:, ROWS, COLUMNS] / (sigma[:, ROWS] * sigma[:, COLUMNS])
+    return {**dict(zip(SIGMAS, sigma.T, strict=True)), **dict(zip(CORRELATIONS, correlations.T, strict=True))}
 
 
 def _rates(rotations: Floats, system: str) -> Floats:

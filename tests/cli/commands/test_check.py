@@ -10,7 +10,6 @@ import numpy as np
 import pyproj
 import pytest
 
-from photostrip.cli.main import main
 from photostrip.project.check import check_project
 from photostrip.report.commands.check import check_sections
 from photostrip.report.page.layout import to_text
@@ -19,28 +18,21 @@ from photostrip.result.table import rows_of
 from tests.loops import nonempty
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
 from tests.results import spec, write_project
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Call
     from tests.results import Document
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 MILLIMETRE = 1e-3
-SAMPLES = sorted((ROOT / "sample_data").glob("*/project.yaml"))
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_project(tmp_path_factory.mktemp("project"), spec("north first", 2))
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = main([str(argument) for argument in arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def small(folder: Path) -> Sample:
@@ -51,9 +43,9 @@ def small(folder: Path) -> Sample:
 # ------------------------------------------------------------------------------------------------ what is told
 
 
-def test_a_good_project_is_decoded_and_nothing_is_written(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_good_project_is_decoded_and_nothing_is_written(project: Path, call: Call) -> None:
     before = {path: path.read_bytes() for path in project.parent.iterdir()}
-    code, out, err = call(capsys, "check", project)
+    code, out, err = call("check", project)
     assert (code, err) == (0, "")
     assert out.splitlines()[0].startswith(f"{project}: OK, ready to run")
     for title in ("Contents", "Ground frames", "Standard deviations of the control", "Rows of the tables"):
@@ -61,18 +53,11 @@ def test_a_good_project_is_decoded_and_nothing_is_written(project: Path, capsys:
     assert {path: path.read_bytes() for path in project.parent.iterdir()} == before
 
 
-@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.parent.name)
-def test_the_sample_projects_are_ready(path: Path) -> None:
-    assert check_project(path).faults == ()
-
-
-def test_every_project_is_checked_and_every_fault_told(
-    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_project_is_checked_and_every_fault_told(project: Path, tmp_path: Path, call: Call) -> None:
     wrong = small(tmp_path)
     wrong.change("project.yaml", "unit: mm", "unit: cm")
     wrong.change("control.csv", "xyz", "xyy")
-    code, out, err = call(capsys, "check", wrong.folder / "project.yaml", tmp_path / "no.yaml", project)
+    code, out, err = call("check", wrong.folder / "project.yaml", tmp_path / "no.yaml", project)
     assert (code, err) == (2, "")
     lines = out.splitlines()
     assert lines[0] == f"{tmp_path}/project.yaml: FAULTY, 2 faults"
@@ -82,18 +67,9 @@ def test_every_project_is_checked_and_every_fault_told(
     assert lines[-1] == "3 projects: 1 OK, 2 faulty"
 
 
-def test_quiet_leaves_verdicts_and_findings(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = call(capsys, "check", project, "--quiet")
+def test_quiet_leaves_verdicts_and_findings(project: Path, call: Call) -> None:
+    _, out, _ = call("check", project, "--quiet")
     assert all(re.match(rf"{project}: OK|(warning|note): ", line) for line in nonempty(out.splitlines()))
-
-
-@pytest.mark.parametrize("width", [60, 100, 200])
-def test_no_line_of_the_tables_is_wider_than_the_page(
-    project: Path, width: int, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _, out, _ = call(capsys, "check", project, "--width", width)
-    tables = out[out.index("──") :].splitlines()
-    assert max(map(len, tables)) <= width
 
 
 # -------------------------------------------------------------------------------- weak geometry, before it is met
@@ -274,11 +250,11 @@ FINDING = {
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_findings_as_json(tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_findings_as_json(tmp_path: Path, command: str, call: Call) -> None:
     made = small(tmp_path)
     made.change("project.yaml", "y_axis: up", "y_axes: up")
     made.change("observations.csv", "-20.25", "-20,25")
-    code, out, err = call(capsys, command, made.folder / "project.yaml", "--format", "json")
+    code, out, err = call(command, made.folder / "project.yaml", "--format", "json")
     document = json.loads(out)
     assert (code, err) == (2, "")
     findings = document["findings"] if command == "run" else document["projects"][0]["findings"]
@@ -290,10 +266,10 @@ def test_findings_as_json(tmp_path: Path, command: str, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_findings_as_annotations(tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_findings_as_annotations(tmp_path: Path, command: str, call: Call) -> None:
     made = small(tmp_path)
     made.change("project.yaml", "unit: mm", "unit: 100%,cm")
-    code, out, _ = call(capsys, command, made.folder / "project.yaml", "--format", "github")
+    code, out, _ = call(command, made.folder / "project.yaml", "--format", "github")
     assert code == 2
     assert out == (
         f"::error file={tmp_path}/project.yaml,line=18,col=9,title=photostrip word"
@@ -301,8 +277,8 @@ def test_findings_as_annotations(tmp_path: Path, command: str, capsys: pytest.Ca
     )
 
 
-def test_weak_geometry_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = call(capsys, "run", small(tmp_path).folder / "project.yaml", "--format", "json")
+def test_weak_geometry_as_json(tmp_path: Path, call: Call) -> None:
+    code, out, err = call("run", small(tmp_path).folder / "project.yaml", "--format", "json")
     document = json.loads(out)
     assert (code, err, document["exit_code"]) == (3, "", 3)
     assert document["findings"][0]["code"] == "too-few-common-points"
@@ -310,20 +286,20 @@ def test_weak_geometry_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.slow
-def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, call: Call) -> None:
     import shutil
 
     shutil.copytree(project.parent, tmp_path / "p")
     table = tmp_path / "p" / "observations.csv"
     text = table.read_text(encoding="utf-8").replace("\n", "\nIMG_1,P1,1,2\n", 1)
     table.write_text(text, encoding="utf-8")
-    _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "json")
+    _, out, _ = call("run", tmp_path / "p" / "project.yaml", "--format", "json")
     note = rows_of(json.loads(out)["notes"])[0]
     assert (note["code"], note["file"], note["line"]) == ("photo-in-no-strip", "observations.csv", 2)
     assert str(tmp_path) not in out
-    _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "github")
+    _, out, _ = call("run", tmp_path / "p" / "project.yaml", "--format", "github")
     assert out.startswith("::warning file=observations.csv,line=2,title=photostrip photo-in-no-strip::")
-    _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml")
+    _, out, _ = call("run", tmp_path / "p" / "project.yaml")
     assert "observations.csv:2: 1 row of 1 photo in no strip is not used: IMG_1" in out
 
 
@@ -331,39 +307,33 @@ def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: 
 
 
 @pytest.mark.slow
-def test_variables_stand_in_for_options(
-    project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_variables_stand_in_for_options(project: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
     monkeypatch.setenv("PHOTOSTRIP_FORMAT", "json")
-    assert json.loads(call(capsys, "check", project)[1])["photostrip_check"] == 1
+    assert json.loads(call("check", project)[1])["photostrip_check"] == 1
     monkeypatch.setenv("PHOTOSTRIP_FORMAT", "text")
     monkeypatch.setenv("PHOTOSTRIP_WIDTH", "60")
-    assert max(map(len, call(capsys, "run", project)[1].splitlines())) <= 60
-    assert call(capsys, "run", project, "--width", "70")[1].splitlines()[2] == "── Verdict ".ljust(70, "─")
+    assert max(map(len, call("run", project)[1].splitlines())) <= 60
+    assert call("run", project, "--width", "70")[1].splitlines()[2] == "── Verdict ".ljust(70, "─")
     monkeypatch.setenv("PHOTOSTRIP_QUIET", "1")
-    assert len(call(capsys, "run", project)[1].splitlines()) < 6
+    assert len(call("run", project)[1].splitlines()) < 6
 
 
-def test_a_wrong_variable_is_refused_by_name(
-    project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_variable_is_refused_by_name(project: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
     monkeypatch.setenv("PHOTOSTRIP_FORMAT", "xml")
-    code, _, err = call(capsys, "check", project)
+    code, _, err = call("check", project)
     assert code == 2
     assert "PHOTOSTRIP_FORMAT" in err
 
 
-def test_debug_by_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_debug_by_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
     monkeypatch.setenv("PHOTOSTRIP_DEBUG", "1")
-    assert "Traceback" in call(capsys, "run", tmp_path / "no.yaml")[2]
+    assert "Traceback" in call("run", tmp_path / "no.yaml")[2]
     monkeypatch.setenv("PHOTOSTRIP_DEBUG", "0")
-    assert "Traceback" not in call(capsys, "run", tmp_path / "no.yaml")[2]
+    assert "Traceback" not in call("run", tmp_path / "no.yaml")[2]
 
 
 @pytest.mark.slow
-def test_what_the_pipeline_would_refuse_is_told_with_its_place(
-    tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_the_pipeline_would_refuse_is_told_with_its_place(tmp_path: Path, project: Path, call: Call) -> None:
     made = small(tmp_path)
     made.change("project.yaml", "crs: EPSG:32633", "crs: geocentric")
     made.change("project.yaml", "axes: [east, north, up]", "axes: [x, y, z]")
@@ -371,7 +341,7 @@ def test_what_the_pipeline_would_refuse_is_told_with_its_place(
     faults = {fault.code: fault for fault in check_project(tmp_path / "project.yaml").faults}
     assert (faults["geocentric-use"].line, faults["geocentric-use"].key) == (22, "control[0]")
     arguments = [project, "--set", "processing.relative.drop=[9/9]"]
-    assert call(capsys, "check", *arguments)[0] == 2
-    code, _, err = call(capsys, "run", *arguments)
+    assert call("check", *arguments)[0] == 2
+    code, _, err = call("run", *arguments)
     assert code == 2
     assert err.startswith("error: --set: processing.relative.drop: `9/9` names no measurement")

@@ -25,6 +25,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Call, Capture
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 PROFILES = ROOT / "configs" / "tolerances"
@@ -56,37 +58,30 @@ def moved() -> str:
     return name
 
 
-@pytest.mark.usefixtures("files")
-def test_what_agrees_ends_with_0(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "result", "same.json"]) == 0
-    printed = capsys.readouterr()
-    assert "SAME: " in printed.out
-    assert printed.err == ""
+def compare(call: Call, *arguments: str, code: int) -> str:
+    """Compare; give what is printed, errors last."""
+    found, out, err = call("compare", *arguments)
+    assert found == code
+    return out + err
 
 
 @pytest.mark.usefixtures("files")
-def test_what_differs_ends_with_1_and_names_the_worst(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "result/result.json", "other.json"]) == 1
-    out = capsys.readouterr().out
+def test_the_exit_code_says_what_agrees_and_the_report_names_the_worst(call: Call) -> None:
+    assert "SAME: " in compare(call, "result", "same.json", code=0)
+    out = compare(call, "result/result.json", "other.json", code=1)
     assert "DIFFERENT: result/result.json and other.json differ: 2 numbers beyond tolerance." in out
     height = next(line for line in out.splitlines() if line.startswith("height"))
     assert re.search(rf"1\s+0\.05  m\s+point {moved()}\s+0\.0002 m", height)
     assert re.search(r"scale factors .* +(1e-05|9\.\d+e-06)\s+model .*, scale_", out)
+    assert "--update writes it" in compare(call, "result", "none.json", code=2)
 
 
-@pytest.mark.usefixtures("files")
-def test_quiet_prints_the_verdict_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "result", "other.json", "--quiet"]) == 1
-    assert capsys.readouterr().out.count("\n") == 1
-
-
-def test_a_profile_decides(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_profile_decides(files: Path, call: Call) -> None:
     own = "photostrip_tolerances: 1\nextends: survey.yaml\nheight: {absolute: 0.06}\n"
     (files / "survey.yaml").write_text((PROFILES / "survey.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     (files / "own.yaml").write_text(own, encoding="utf-8")
-    assert main(["compare", "result", "other.json", "--tol", "survey.yaml"]) == 1
-    assert main(["compare", "result", "other.json", "--tol", "own.yaml"]) == 0
-    assert "0.06 m" in capsys.readouterr().out
+    compare(call, "result", "other.json", "--tol", "survey.yaml", code=1)
+    assert "0.06 m" in compare(call, "result", "other.json", "--tol", "own.yaml", code=0)
 
 
 @pytest.mark.parametrize("form", ["text", "json", "md", "junit", "github"])
@@ -96,23 +91,19 @@ def test_the_exit_code_is_the_same_in_every_form(form: str, baseline: str, code:
     assert main(["compare", "result", baseline, "--format", form]) == code
 
 
-@pytest.mark.usefixtures("files")
-def test_json_is_the_whole_comparison(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["compare", "result", "other.json", "--format", "json"])
-    found = json.loads(capsys.readouterr().out)
+def test_every_form_says_what_differs(files: Path, call: Call) -> None:
+    found = json.loads(compare(call, "result", "other.json", "--format", "json", code=1))
     assert (found["photostrip_compare"], found["status"]) == (1, "different")
     assert [(row["kind"], row["id"]) for row in found["differences"]][1] == ("height", moved())
     assert found["differences"][0]["kind"] == "scale"
-
-
-@pytest.mark.usefixtures("files")
-def test_junit_has_a_case_for_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["compare", "result", "other.json", "--format", "junit"])
-    suite = parsed(capsys.readouterr().out)
+    suite = parsed(compare(call, "result", "other.json", "--format", "junit", code=1))
     assert (suite.get("tests"), suite.get("failures")) == ("12", "2")
     failed = {case.get("name"): case[0] for case in suite if len(case)}
     assert set(failed) == {"height", "scale factors"}
     assert moved() in (failed["height"].text or "")
+    line = line_finder((files / "other.json").read_text(encoding="utf-8"))("points", "")
+    annotation = f"::error file=other.json,line={line},title=photostrip different::point {moved()}, height"
+    assert annotation in compare(call, "result", "other.json", "--format", "github", code=1)
 
 
 def test_junit_holds_any_text() -> None:
@@ -124,51 +115,34 @@ def test_junit_holds_any_text() -> None:
     assert suite[1][0].tag == "skipped"
 
 
-def test_annotations_lead_to_the_line_of_the_baseline(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(["compare", "result", "other.json", "--format", "github"])
-    out = capsys.readouterr().out
-    found = re.search(rf"::error file=other\.json,line=(\d+),title=photostrip different::point {moved()}, height", out)
-    assert found is not None
-    assert int(found[1]) == line_finder((files / "other.json").read_text(encoding="utf-8"))("points", "")
-
-
-def test_many_differences_are_counted(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_differences_are_counted(files: Path, call: Call) -> None:
     document = json.loads((files / "same.json").read_text(encoding="utf-8"))
     for axis in "xz":
         document["points"][axis] = [value + 1.0 for value in document["points"][axis]]
     (files / "other.json").write_text(to_json(document), encoding="utf-8")
-    assert main(["compare", "result", "other.json"]) == 1
-    assert "more; --verbose prints all" in capsys.readouterr().out
-    main(["compare", "result", "other.json", "--format", "github"])
-    assert (
-        capsys.readouterr().out.splitlines()[-1].endswith("more differences; photostrip compare --verbose lists them")
-    )
+    assert "more; --verbose prints all" in compare(call, "result", "other.json", code=1)
+    last = compare(call, "result", "other.json", "--format", "github", code=1).splitlines()[-1]
+    assert last.endswith("more differences; photostrip compare --verbose lists them")
 
 
 # ------------------------------------------------------------------------------------------- the baseline anew
 
 
-def test_update_writes_a_baseline_that_agrees(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "result", "new/baseline.json", "--update"]) == 0
-    assert capsys.readouterr().err == "wrote new/baseline.json\n"
-    assert main(["compare", "result", "new"]) == 0
+def test_update_writes_a_baseline_that_agrees_and_says_what_changes(files: Path, call: Call) -> None:
+    assert compare(call, "result", "new/baseline.json", "--update", code=0) == "wrote new/baseline.json\n"
+    compare(call, "result", "new", code=0)
     assert (files / "new/baseline.json").read_bytes() == (files / "same.json").read_bytes()
-
-
-def test_update_says_what_changes(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "result", "other.json", "--update"]) == 0
-    assert "; DIFFERENT: result/result.json and the baseline before differ: 2 numbers" in capsys.readouterr().err
-    assert main(["compare", "result", "other.json"]) == 0
+    said = compare(call, "result", "other.json", "--update", code=0)
+    assert "; DIFFERENT: result/result.json and the baseline before differ: 2 numbers" in said
+    compare(call, "result", "other.json", code=0)
     (files / "other.json").write_text("{", encoding="utf-8")
-    assert main(["compare", "result", "other.json", "--update"]) == 0
-    assert "could not be compared" in capsys.readouterr().err
+    assert "could not be compared" in compare(call, "result", "other.json", "--update", code=0)
 
 
-def test_a_result_is_no_baseline_of_itself(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_result_is_no_baseline_of_itself(files: Path, call: Call) -> None:
     before = (files / "result/result.json").read_bytes()
-    assert main(["compare", "result", "result/result.json", "--update"]) == 2
-    assert "is the result itself" in capsys.readouterr().err
-    assert main(["compare", "result", "result", "--update"]) == 0
+    assert "is the result itself" in compare(call, "result", "result/result.json", "--update", code=2)
+    compare(call, "result", "result", "--update", code=0)
     assert (files / "result/result.json").read_bytes() == before
     assert (files / "result/baseline.json").read_bytes() == (files / "same.json").read_bytes()
 
@@ -182,40 +156,10 @@ def test_a_baseline_that_cannot_be_written_stays_whole(files: Path, monkeypatch:
     with monkeypatch.context() as patched:
         patched.setattr(writing, "_write", full)
         assert main(["compare", "result", "other.json", "--update"]) == 2
-    assert (files / "other.json").read_bytes() == before
-    assert sorted(path.name for path in files.iterdir()) == ["other.json", "result", "same.json"]
-
-
-# ------------------------------------------------------------------------------------------- what is refused
-
-
-@pytest.mark.usefixtures("files")
-def test_a_missing_baseline_says_how_it_comes_to_be(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "result", "none.json"]) == 2
-    assert "--update writes it" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("text", "code"),
-    [
-        ("{}", "result-kind"),
-        ('{"photostrip_result": 1}', "result-schema"),
-        ("[", "result-json"),
-        ('{"photostrip_result": 2}', "result-incomplete"),
-    ],
-)
-def test_what_is_no_result_is_refused(files: Path, text: str, code: str, capsys: pytest.CaptureFixture[str]) -> None:
-    (files / "other.json").write_text(text, encoding="utf-8")
-    assert main(["compare", "result", "other.json", "--format", "json"]) == 2
-    found = json.loads(capsys.readouterr().out)
-    assert {each["code"] for each in found["findings"]} == {code}
-
-
-def test_a_broken_result_never_becomes_a_baseline(files: Path) -> None:
-    (files / "result/result.json").write_text('{"photostrip_result": 2}', encoding="utf-8")
-    before = (files / "other.json").read_bytes()
+    (files / "result/result.json").write_text('{"photostrip_result": 2}', encoding="utf-8")  # is never a baseline
     assert main(["compare", "result", "other.json", "--update"]) == 2
     assert (files / "other.json").read_bytes() == before
+    assert sorted(path.name for path in files.iterdir()) == ["other.json", "result", "same.json"]
 
 
 # ------------------------------------------------------------------------------------------- whole folders
@@ -232,82 +176,69 @@ def folders(files: Path) -> Path:
     return files
 
 
-def answer(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
-    assert main(["compare", "all", "base", "--format", "json"]) in {0, 1, 2}
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return found
-
-
 @pytest.mark.usefixtures("folders")
-def test_folders_agree_when_every_result_does(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "all", "base"]) == 0
-    assert "SAME: 3 results of all and base agree" in capsys.readouterr().out
-    assert [each["folder"] for each in answer(capsys)["results"]] == ["a", "b", "deep/c"]
-    assert main(["compare", "all", "base", "-q"]) == 0
-    assert capsys.readouterr().out.count("\n") == 1
+def test_folders_agree_when_every_result_does(call: Call) -> None:
+    assert "SAME: 3 results of all and base agree" in compare(call, "all", "base", code=0)
+    found = json.loads(compare(call, "all", "base", "--format", "json", code=0))
+    assert [each["folder"] for each in found["results"]] == ["a", "b", "deep/c"]
+    assert compare(call, "all", "base", "-q", code=0).count("\n") == 1
 
 
-def test_a_folder_that_differs_or_stands_alone_is_named(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_differs_or_stands_alone_is_named(folders: Path, call: Call) -> None:
     (folders / "base/a/baseline.json").write_bytes((folders / "other.json").read_bytes())
     (folders / "base/b").rename(folders / "base/d")
-    assert main(["compare", "all", "base"]) == 1
-    printed = capsys.readouterr().out
+    printed = compare(call, "all", "base", code=1)
     assert "1 result of 2 beyond tolerance; no result for d; no baseline for b" in printed
-    found = answer(capsys)
+    found = json.loads(compare(call, "all", "base", "--format", "json", code=1))
     assert (found["status"], found["missing"], found["new"]) == ("different", ["d"], ["b"])
     assert [each["status"] for each in found["results"]] == ["different", "same"]
-    assert main(["compare", "all", "base", "--format", "junit"]) == 1
-    suite = parsed(capsys.readouterr().out)
+    suite = parsed(compare(call, "all", "base", "--format", "junit", code=1))
     bad = {each.get("name") for each in nonempty(suite) if len(each)}
     assert {"b", "d", "a: height", "a: scale factors"} <= bad
     assert not any(name.startswith("deep/c") for name in bad if name)
-    assert main(["compare", "all", "base", "--format", "github"]) == 1
     line = line_finder((folders / "other.json").read_text(encoding="utf-8"))("points", "")
-    assert f"::error file=base/a/baseline.json,line={line}," in capsys.readouterr().out
+    annotations = compare(call, "all", "base", "--format", "github", code=1)
+    assert f"::error file=base/a/baseline.json,line={line}," in annotations
 
 
 @pytest.mark.slow
-def test_a_broken_baseline_does_not_hide_the_others(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_broken_baseline_does_not_hide_the_others(folders: Path, call: Call) -> None:
     (folders / "base/a/baseline.json").write_text("{", encoding="utf-8")
     (folders / "base/b/baseline.json").write_bytes((folders / "other.json").read_bytes())
-    assert main(["compare", "all", "base"]) == 2
-    printed = capsys.readouterr().out
+    printed = compare(call, "all", "base", code=2)
     assert "REFUSED: all and base differ: 1 result that cannot be compared; 1 result of 2 beyond tolerance." in printed
     assert "- base/a/baseline.json:1:2: is not JSON" in printed
-    found = answer(capsys)
+    found = json.loads(compare(call, "all", "base", "--format", "json", code=2))
     assert found["status"] == "refused"
     assert [(each["folder"], each["code"]) for each in found["refused"]] == [("a", "result-json")]
     assert [(each["folder"], each["status"]) for each in found["results"]] == [("b", "different"), ("deep/c", "same")]
-    assert main(["compare", "all", "base", "--format", "junit"]) == 2
-    cases = {each.get("name"): each for each in parsed(capsys.readouterr().out)}
+    suite = parsed(compare(call, "all", "base", "--format", "junit", code=2))
+    cases = {each.get("name"): each for each in suite}
     assert cases["a"].find("error") is not None
     assert cases["deep/c: height"].find("failure") is None
-    assert main(["compare", "all", "base", "--format", "github"]) == 2
-    assert "::error file=base/a/baseline.json,line=1,title=photostrip result-json::" in capsys.readouterr().out
+    annotations = compare(call, "all", "base", "--format", "github", code=2)
+    assert "::error file=base/a/baseline.json,line=1,title=photostrip result-json::" in annotations
 
 
 @pytest.mark.slow
-def test_update_writes_the_baselines_of_a_folder(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_update_writes_the_baselines_of_a_folder(folders: Path, call: Call) -> None:
     (folders / "base/b/baseline.json").write_bytes((folders / "other.json").read_bytes())
-    assert main(["compare", "all", "new", "--update"]) == 0
-    assert capsys.readouterr().err.splitlines() == [f"wrote new/{name}/baseline.json" for name in ("a", "b", "deep/c")]
-    assert main(["compare", "all", "new"]) == 0
-    assert main(["compare", "all", "base", "--update"]) == 0
-    assert "wrote base/b/baseline.json; DIFFERENT" in capsys.readouterr().err
-    assert main(["compare", "all", "base"]) == 0
+    said = compare(call, "all", "new", "--update", code=0)
+    assert said.splitlines() == [f"wrote new/{name}/baseline.json" for name in ("a", "b", "deep/c")]
+    compare(call, "all", "new", code=0)
+    assert "wrote base/b/baseline.json; DIFFERENT" in compare(call, "all", "base", "--update", code=0)
+    compare(call, "all", "base", code=0)
 
 
-def test_folders_without_results_are_refused(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folders_without_results_are_refused(folders: Path, call: Call) -> None:
     (folders / "empty").mkdir()
     for given, words in (
         (("empty", "base"), "empty: holds no result.json, nor does a folder in it"),
         (("all", "none"), "none: is no folder, and all is one of 3 results"),
         (("all", "same.json"), "same.json: is no folder, and all is one of 3 results"),
     ):
-        assert main(["compare", *given]) == 2
-        assert words in capsys.readouterr().err
-    assert main(["compare", "all", "empty"]) == 1
-    assert "no baseline for a, b, deep/c" in capsys.readouterr().out
+        assert words in compare(call, *given, code=2)
+    assert "no baseline for a, b, deep/c" in compare(call, "all", "empty", code=1)
 
 
 # ------------------------------------------------------------------------------------------- profiles
@@ -352,7 +283,7 @@ def test_a_faulty_profile_is_told_by_line(tmp_path: Path) -> None:
     assert "did you mean `absolute`?" in str(refused.value)
 
 
-def test_the_schema_of_profiles_has_their_defaults(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_schema_of_profiles_has_their_defaults(capsys: Capture) -> None:
     assert main(["schema", "--tolerances"]) == 0
     schema = json.loads(capsys.readouterr().out)
     usual = Tolerances()

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip import __version__
-from photostrip.cli.main import main
 from photostrip.project.check import check_project
 from photostrip.project.template import template_files
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from tests.calls import Call
 
 SAMPLE = ROOT / "sample_data" / "simulated-20"
 FILLED = {
@@ -28,20 +29,12 @@ FILLED = {
 }
 
 
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = main([str(argument) for argument in arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
 # -------------------------------------------------------------------------------------------------------- init
 
 
-def test_the_template_asks_for_what_is_missing_and_for_nothing_else(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_template_asks_for_what_is_missing_and_for_nothing_else(tmp_path: Path, call: Call) -> None:
     folder = tmp_path / "deep" / "strip a"
-    assert call(capsys, "init", folder)[0] == 0
+    assert call("init", folder)[0] == 0
     assert {path.name for path in folder.iterdir()} == set(template_files("x"))
     faults = check_project(folder / "project.yaml").faults
     assert [(fault.key, fault.code) for fault in faults] == [
@@ -56,9 +49,9 @@ def test_the_template_asks_for_what_is_missing_and_for_nothing_else(
 
 
 @pytest.mark.slow
-def test_the_template_runs_when_it_is_filled_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_template_runs_when_it_is_filled_in(tmp_path: Path, call: Call) -> None:
     folder = tmp_path / "strip"
-    call(capsys, "init", folder)
+    call("init", folder)
     path = folder / "project.yaml"
     text = path.read_text(encoding="utf-8")
     for empty, filled in FILLED.items():
@@ -70,7 +63,7 @@ def test_the_template_runs_when_it_is_filled_in(tmp_path: Path, capsys: pytest.C
         assert (folder / name).read_text(encoding="utf-8") == head + "\n"
         (folder / name).write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
     assert check_project(path).faults == ()
-    code, out, _ = call(capsys, "run", path)
+    code, out, _ = call("run", path)
     assert code == 0
     assert out.startswith("Accuracy report: strip\n")
 
@@ -92,50 +85,43 @@ def test_any_name_of_a_folder_does(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(template_files("x")))
-def test_nothing_is_overwritten(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_is_overwritten(tmp_path: Path, name: str, call: Call) -> None:
     (tmp_path / name).write_text("mine", encoding="utf-8")
-    code, _, err = call(capsys, "init", tmp_path)
+    code, _, err = call("init", tmp_path)
     assert code == 2
     assert err.startswith(f"error: {tmp_path}/{name}: already exists and is not overwritten")
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
 
 
-def test_a_folder_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "f").write_text("", encoding="utf-8")
-    code, _, err = call(capsys, "init", tmp_path / "f")
-    assert code == 2
-    assert "is a file; expected a folder" in err
-
-
 # ------------------------------------------------------------------------------------------------------ schema
 
 
-def test_the_schema_goes_into_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(capsys, "schema", "-o", tmp_path / "s.json") == (0, "", "")
-    assert (tmp_path / "s.json").read_text(encoding="utf-8") == call(capsys, "schema")[1]
+def test_the_schema_goes_into_a_file(tmp_path: Path, call: Call) -> None:
+    assert call("schema", "-o", tmp_path / "s.json") == (0, "", "")
+    assert (tmp_path / "s.json").read_text(encoding="utf-8") == call("schema")[1]
 
 
 # -------------------------------------------------------------------------------------------------------- info
 
 
-def test_info_names_versions_threads_and_formats(capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_names_versions_threads_and_formats(call: Call) -> None:
     import numpy as np
 
-    code, out, err = call(capsys, "info")
+    code, out, err = call("info")
     assert (code, err) == (0, "")
     for text in (f"photostrip  {__version__}", f"numpy {np.__version__}", "OMP_NUM_THREADS=", "result.json"):
         assert text in out
-    document = json.loads(call(capsys, "info", "--format", "json")[1])
+    document = json.loads(call("info", "--format", "json")[1])
     assert document["libraries"]["numpy"] == np.__version__
 
 
 def test_info_says_how_to_get_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    from photostrip.cli.jobs import installation
+    from photostrip.cli import about
 
     lines = ["numpy>=1", "plotter-of-nothing>=3; extra == 'plots'", "pytest>=8; extra == 'test'"]
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: lines)
-    found = installation.installation()
+    found = about.installation()
     assert set(found["extras"]) == {"plots"}
     assert found["extras"]["plots"]["missing"] == ["plotter-of-nothing"]
-    assert "pip install 'photostrip[plots]'" in installation.as_text(found)
+    assert "pip install 'photostrip[plots]'" in "".join(about._lines(found))

@@ -18,6 +18,8 @@ from tests.loops import nonempty
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Answer, Call
+
 CAMERAS = """\
 photostrip_plan_cameras: 1
 cameras:
@@ -26,18 +28,13 @@ cameras:
 """
 
 
-def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(arguments) == 0
-    return capsys.readouterr().out
-
-
-def test_keys_that_are_set_and_a_file_say_the_same(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_keys_that_are_set_and_a_file_say_the_same(answer: Answer, tmp_path: Path) -> None:
     keys = ["camera={principal_distance: 100, format: [180, 160]}", "end_lap_percent=65", "flying_height=800"]
     keys += ["image_sigma_um=3", "control={layout: six, sigma: [0.02, 0.03, 0.04]}"]
-    from_keys = answer(capsys, "plan", "model", *(f"--set={key}" for key in keys), "--format", "json")
+    from_keys = answer("plan", "model", *(f"--set={key}" for key in keys), "--format", "json")
     file = tmp_path / "m.yaml"
     file.write_text("\n".join(["photostrip_plan_model: 1", *(key.replace("=", ": ") for key in keys)]))
-    assert answer(capsys, "plan", "model", str(file), "--format", "json") == from_keys
+    assert answer("plan", "model", str(file), "--format", "json") == from_keys
     found = json.loads(from_keys)
     b, a = 63.0, 64.0
     spec = ModelSpec(100, b, a, 8000, 0.003, control=control_layout("six", b, a), control_sigma=(0.02, 0.03, 0.04))
@@ -46,20 +43,20 @@ def test_keys_that_are_set_and_a_file_say_the_same(capsys: pytest.CaptureFixture
     assert found["worst"]["sigma_z_m"] == pytest.approx(expected.sigmas[:, 2].max(), abs=1e-5)
 
 
-def test_sources_add_up_and_the_table_is_the_document(capsys: pytest.CaptureFixture[str]) -> None:
-    document = json.loads(answer(capsys, "plan", "model", "--format", "json"))
+def test_sources_add_up_and_the_table_is_the_document(answer: Answer) -> None:
+    document = json.loads(answer("plan", "model", "--format", "json"))
     share = {row["source"]: row for row in document["sources"]}
     parts = ("measuring of the point", "orientation, together", "control, measured", "control, given")
     for name in ("plan_rms_m", "z_rms_m"):
         assert np.sqrt(sum(share[part][name] ** 2 for part in parts)) == pytest.approx(share["all"][name], abs=3e-4)
-    rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "model", "--format", "csv"))))
+    rows = list(csv.DictReader(io.StringIO(answer("plan", "model", "--format", "csv"))))
     assert [float(row["sigma_z_m"]) for row in rows] == [point["sigma_z_m"] for point in document["points"]]
     assert share["all, elements adjusted"]["z_max_m"] < share["all"]["z_max_m"]
 
 
-def test_more_points_in_a_zone_lower_what_the_elements_do(capsys: pytest.CaptureFixture[str]) -> None:
+def test_more_points_in_a_zone_lower_what_the_elements_do(answer: Answer) -> None:
     def sigmas(*more: str) -> list[float]:
-        document = json.loads(answer(capsys, "plan", "model", "--format", "json", *more))
+        document = json.loads(answer("plan", "model", "--format", "json", *more))
         return list(document["orientation"].values())[1:]
 
     ratio = np.array(sigmas("--set", "orientation.zone_points=4")) / sigmas()
@@ -68,10 +65,10 @@ def test_more_points_in_a_zone_lower_what_the_elements_do(capsys: pytest.Capture
     assert sigmas("--set", f"orientation.points={six}") == sigmas()
 
 
-def test_cameras_from_a_list(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_cameras_from_a_list(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text(CAMERAS)
-    document = json.loads(answer(capsys, "plan", "camera", str(file), "--format", "json"))
+    document = json.loads(answer("plan", "camera", str(file), "--format", "json"))
     wide, digital = document["cameras"]
     assert (document["reference"], document["fewest_photos"], document["smallest_coefficient"]) == (
         "digital",
@@ -81,7 +78,7 @@ def test_cameras_from_a_list(capsys: pytest.CaptureFixture[str], tmp_path: Path)
     assert wide["base_mm"] == pytest.approx(92.0)
     assert wide["coefficient_mm2"] == pytest.approx(153 * 0.007)
     assert digital["eta_area"] == 1
-    text = answer(capsys, "plan", "camera", str(file), "--format", "md")
+    text = answer("plan", "camera", str(file), "--format", "md")
     assert "| wide | 153 | 7.0 |" in text
 
 
@@ -102,19 +99,17 @@ TWO = CAMERAS.partition("cameras:\n")[2]
         ("  a: {principal_distance: 153, base: 60, sigma_um: 3}\nscale: 3\nrelief: 9\n", "follows from their format"),
     ],
 )  # fmt: skip
-def test_a_wrong_list_of_cameras_is_refused(
-    text: str, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_wrong_list_of_cameras_is_refused(text: str, message: str, call: Call, tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text(f"photostrip_plan_cameras: 1\ncameras:\n{text}")
-    assert main(["plan", "camera", str(file)]) == 2
-    assert message in capsys.readouterr().err
+    found, _, err = call("plan", "camera", str(file))
+    assert (found, message in err) == (2, True)
 
 
-def test_cameras_over_ground(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_cameras_over_ground(answer: Answer, call: Call, tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text(CAMERAS + "side_lap_percent: 30\nheight_sigma: 0.2\nrelief: 400\nslope_deg: 60\n")
-    document = json.loads(answer(capsys, "plan", "camera", str(file), "--format", "json"))
+    document = json.loads(answer("plan", "camera", str(file), "--format", "json"))
     assert [row["useful_width_mm"] for row in document["cameras"]] == pytest.approx([161, 72.702])
     assert document["models"][0]["base_ratio"] == pytest.approx(153 / 92, abs=1e-4)
     for row in nonempty(document["survey"]):
@@ -123,19 +118,19 @@ def test_cameras_over_ground(capsys: pytest.CaptureFixture[str], tmp_path: Path)
         assert row["photos_per_100_km2"] == pytest.approx(100 / row["area_km2"], rel=3e-3)
     assert [row["suits"] for row in document["terrain_limits"]] == [False, True]
     assert document["recommended"] == "digital"
-    text = answer(capsys, "plan", "camera", str(file))
+    text = answer("plan", "camera", str(file))
     assert "recommended    digital, the most efficient" in text
-    text = answer(capsys, "plan", "camera", str(file), "--set", "slope_deg=80")
+    text = answer("plan", "camera", str(file), "--set", "slope_deg=80")
     assert "recommended    none of these cameras" in text
     left = "{model: radial-table, direction: image_to_ideal, radius: [0, 50], distortion: [0, 0.003]}"
     camera = f"cameras.b={{principal_distance: 88, image_sigma_um: 4, format: [230, 230], distortion: {left}}}"
-    assert main(["plan", "camera", str(file), "--set", camera]) == 2
-    assert "cameras.b.distortion: a point" in capsys.readouterr().err
+    found, _, err = call("plan", "camera", str(file), "--set", camera)
+    assert (found, "cameras.b.distortion: a point" in err) == (2, True)
 
 
-def test_cameras_need_a_list(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", "camera"]) == 2
-    assert "no cameras are given; name a YAML file" in capsys.readouterr().err
+def test_cameras_need_a_list(call: Call) -> None:
+    found, _, err = call("plan", "camera")
+    assert (found, "no cameras are given; name a YAML file" in err) == (2, True)
 
 
 GIVEN = """\
@@ -153,10 +148,10 @@ element_errors: {dby_um: 4, dbz_um: -3, dkappa_arcsec: 6, dalpha_arcsec: -4, dom
 """
 
 
-def test_given_errors_come_out_as_errors_of_points(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_given_errors_come_out_as_errors_of_points(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "m.yaml"
     file.write_text(GIVEN)
-    document = json.loads(answer(capsys, "plan", "model", str(file), "--format", "json"))
+    document = json.loads(answer("plan", "model", str(file), "--format", "json"))
     parts: dict[str, dict[str, list[float]]] = {}
     for row in nonempty(document["errors"]):
         parts.setdefault(row["point"], {})[row["part"]] = [row[f"error_{axis}_m"] for axis in "xyz"]
@@ -172,19 +167,19 @@ def test_given_errors_come_out_as_errors_of_points(capsys: pytest.CaptureFixture
     assert [part["total"][2] for part in parts.values()] == pytest.approx(found.parts.total[:, 2] * 10, abs=1e-5)
     assert document["named"][0]["height_m"] == 120
     assert list(document["element_errors"].values()) == [4, -3, 6, -4, 8]
-    text = answer(capsys, "plan", "model", str(file))
+    text = answer("plan", "model", str(file))
     for words in ("relative orientation, dx2", "Corrections from the misclosures", "before levelling", "At the points"):
         assert words in text
     # the same as a list
-    again = answer(capsys, "plan", "model", str(file), "--set", "element_errors=[4,-3,6,-4,8]", "--format", "json")
+    again = answer("plan", "model", str(file), "--set", "element_errors=[4,-3,6,-4,8]", "--format", "json")
     assert json.loads(again) == document
 
 
-def test_misclosures_come_out_as_corrections(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_misclosures_come_out_as_corrections(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "m.yaml"
     points = "".join(f"    - {{at: [{x}, {y}], misclosure: [0.1, -0.2, 0.3]}}\n" for x in (0, 90) for y in (-80, 80))
     file.write_text(f"photostrip_plan_model: 1\ncontrol:\n  points:\n{points}points: [{{name: A, at: [20, 30]}}]\n")
-    given = json.loads(answer(capsys, "plan", "model", str(file), "--format", "json"))
+    given = json.loads(answer("plan", "model", str(file), "--format", "json"))
     assert "errors" not in given
     # a shift of the whole control is a shift of the model, and no sign of wrong elements
     wanted = [0.1, -0.2, 0.3]
@@ -193,17 +188,17 @@ def test_misclosures_come_out_as_corrections(capsys: pytest.CaptureFixture[str],
     assert list(given["adjusted_elements"].values()) == pytest.approx([0, 0, 0, 0], abs=0.01)
 
 
-def test_both_forms_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+def test_both_forms_side_by_side(answer: Answer) -> None:
     points = ("--set", "points=[{name: A, at: [20, 30]}]")
     both = (*points, "--set", "closed_form=yes")
-    forms = json.loads(answer(capsys, "plan", "model", *both, "--format", "json"))
+    forms = json.loads(answer("plan", "model", *both, "--format", "json"))
     assert len(forms["sums"]) == 15
     assert len(forms["coefficients"]) == 3 * 4
     assert len(forms["weights"]) == 4 * 5
     for row in nonempty(forms["coefficients"] + forms["weights"]):
         assert row["closed"] == pytest.approx(row["operators"], rel=1e-6, abs=1e-8)
         assert "printed" not in row
-    text = answer(capsys, "plan", "model", *points, "--set", "closed_form=printed")
+    text = answer("plan", "model", *points, "--set", "closed_form=printed")
     assert text.count("misprint") > 5
     assert "c15" in text
 
@@ -245,20 +240,18 @@ MEASURED = "control.points=[{at: [1, 2], misclosure: [0, 0, 1]}]"
         ("screening", ["second_errors=40"], 2, "do not go into 34 pairs"),
     ],
 )  # fmt: skip
-def test_a_wrong_plan_is_refused(
-    kind: str, keys: list[str], code: int, message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["plan", kind, *(f"--set={key}" for key in keys)]) == code
-    assert message in " ".join(capsys.readouterr().err.split())
+def test_a_wrong_plan_is_refused(kind: str, keys: list[str], code: int, message: str, call: Call) -> None:
+    found, _, err = call("plan", kind, *(f"--set={key}" for key in keys))
+    assert (found, message in " ".join(err.split())) == (code, True)
 
 
 @pytest.mark.parametrize("ending", [".json", ".csv", ".md", ".txt"])
-def test_files_are_what_is_printed(ending: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_files_are_what_is_printed(ending: str, answer: Answer, tmp_path: Path) -> None:
     target = tmp_path / f"plan{ending}"
     form = "text" if ending == ".txt" else ending[1:]
-    shown = answer(capsys, "plan", "model", "--format", form, "-o", str(target))
+    shown = answer("plan", "model", "--format", form, "-o", str(target))
     assert target.read_text(encoding="utf-8") == shown
-    assert answer(capsys, "plan", "model", "-q", "-o", str(target)) == ""
+    assert answer("plan", "model", "-q", "-o", str(target)) == ""
     assert main(["plan", "model", "-o", str(tmp_path / "plan.docx")]) == 2
 
 
@@ -279,17 +272,17 @@ place: {points: 1, into: ends, method: similarity}
 """
 
 
-def test_a_strip_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_strip_from_keys_and_from_a_file(answer: Answer, tmp_path: Path) -> None:
     keys = ["models=5", "layouts=[bands=2, corners]", "methods=[similarity, degree 2]", "points.rows=3"]
     keys += ["required=[0.4, 0.5]", "control_sigma=[0.02, 0.02, 0.03]"]
-    from_keys = answer(capsys, "plan", "strip", *(f"--set={key}" for key in keys), "--format", "json")
+    from_keys = answer("plan", "strip", *(f"--set={key}" for key in keys), "--format", "json")
     file = tmp_path / "s.yaml"
     file.write_text(
         'photostrip_plan_strip: 1\nmodels: 5\nlayouts: {"2 bands": {bands: 2}, corners: {layout: corners}}\n'
         "methods: [similarity, degree 2]\npoints: {rows: 3}\nrequired: {plan: 0.4, height: 0.5}\n"
         "control_sigma: [0.02, 0.02, 0.03]\n"
     )
-    assert answer(capsys, "plan", "strip", str(file), "--format", "json") == from_keys
+    assert answer("plan", "strip", str(file), "--format", "json") == from_keys
     document = json.loads(from_keys)
     assert [row["layout"] for row in document["accuracy"]] == ["2 bands", "2 bands", "corners", "corners"]
     assert len(document["along"]) == 4 * 6
@@ -297,13 +290,13 @@ def test_a_strip_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[str], t
 
 
 @pytest.mark.slow
-def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_report_of_a_strip(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "s.yaml"
     file.write_text(STRIP)
-    text = answer(capsys, "plan", "strip", str(file))
+    text = answer("plan", "strip", str(file))
     for words in ("ends", "0.050 0.050 0.080, offset free", "3/2 xy", "0.500 m in height", "Best places", "never"):
         assert words in text
-    document = json.loads(answer(capsys, "plan", "strip", str(file), "--format", "json"))
+    document = json.loads(answer("plan", "strip", str(file), "--format", "json"))
     by = {(row["layout"], row["method"]): row for row in document["accuracy"]}
     assert ("gnss", "similarity") not in by  # only the bundle uses perspective centres
     assert by["gnss", "bundle"]["worst_z_m"] < by["ends", "bundle"]["worst_z_m"]
@@ -311,91 +304,90 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         along = [each for each in document["along"] if (each["layout"], each["method"]) == who]
         assert max(each["z_m"] for each in along) == pytest.approx(row["worst_z_m"], abs=0.05)
         assert row["meets"] == (row["worst_z_m"] <= 0.5)
-    rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "strip", str(file), "--format", "csv"))))
+    rows = list(csv.DictReader(io.StringIO(answer("plan", "strip", str(file), "--format", "csv"))))
     assert len(rows) == 5 * 6
     assert list(rows[0]) == ["layout", "method", "photo", "plan_m", "z_m"]
 
 
-def test_all_faults_of_a_strip_are_told_where_they_stand(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_all_faults_of_a_strip_are_told_where_they_stand(call: Call, tmp_path: Path) -> None:
     plan = tmp_path / "strip.yaml"
     layouts = "  a: bands=20\n  b: {per_band: 9}\n  c: {layout: points, points: [[99, 1]]}\n"
     plan.write_text(f"photostrip_plan_strip: 1\ngnss: [0.1, 0.1, 0.1]\nlayouts:\n{layouts}", encoding="utf-8")
-    assert main(["plan", "strip", str(plan)]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.split(": ")[1].rsplit(":", 2)[1] for line in lines] == ["4", "5", "6"]
-    assert main(["plan", "strip", str(plan), "--set", "methods=[similarity]"]) == 2
-    assert "of use to the bundle alone" in capsys.readouterr().err
-    assert main(["plan", "model", str(plan)]) == 2
-    assert capsys.readouterr().err.endswith("this is a plan for `photostrip plan strip`\n")
+    _, _, err = call("plan", "strip", plan)
+    assert [line.split(": ")[1].rsplit(":", 2)[1] for line in err.splitlines()] == ["4", "5", "6"]
+    found, _, err = call("plan", "strip", str(plan), "--set", "methods=[similarity]")
+    assert (found, "of use to the bundle alone" in err) == (2, True)
+    found, _, err = call("plan", "model", plan)
+    assert (found, err.endswith("this is a plan for `photostrip plan strip`\n")) == (2, True)
 
 
-def test_every_layout_with_and_without_perspective_centres(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_layout_with_and_without_perspective_centres(answer: Answer) -> None:
     keys = ("models=8", "layouts=[corners]", "methods=[similarity, bundle]", "gnss=[0.05, 0.05, 0.08]")
-    document = json.loads(answer(capsys, "plan", "strip", *(f"--set={key}" for key in keys), "--format", "json"))
+    document = json.loads(answer("plan", "strip", *(f"--set={key}" for key in keys), "--format", "json"))
     rows = {(row["layout"], row["method"]): row["worst_z_m"] for row in document["accuracy"]}
     assert list(rows) == [("corners", "similarity"), ("corners", "bundle"), ("corners + GNSS", "bundle")]
     assert rows["corners + GNSS", "bundle"] < 0.5 * rows["corners", "bundle"]
 
 
-def test_the_worst_place_lies_at_the_photo_farthest_from_control(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_worst_place_lies_at_the_photo_farthest_from_control(answer: Answer) -> None:
     layout = "layouts.near={layout: points, points: [[1, 1], [1, 5], [2, 3]]}"
     options = ("--set", "models=4", "--set", layout, "--set", "methods=[similarity]")
-    document = json.loads(answer(capsys, "plan", "strip", *options, "--format", "json"))
+    document = json.loads(answer("plan", "strip", *options, "--format", "json"))
     (row,) = document["accuracy"]
     assert row["worst_z_at"]["photo"] == row["worst_plan_at"]["photo"] == 5
     assert [f"{each['z_m']:.2f}" for each in document["along"]][-1] == f"{row['worst_z_m']:.2f}"
-    heads = [line.split()[2:] for line in answer(capsys, "plan", "strip", *options).splitlines() if "method  " in line]
+    heads = [line.split()[2:] for line in answer("plan", "strip", *options).splitlines() if "method  " in line]
     assert ["1", "2", "3", "4", "5"] in heads
 
 
-def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_little_control_stands_in_the_table(answer: Answer) -> None:
     keys = ("models=4", "layouts.one={layout: points, points: [[1, 1]]}", "methods=[similarity]")
-    assert "cannot orient a strip" in answer(capsys, "plan", "strip", *(f"--set={key}" for key in keys))
+    assert "cannot orient a strip" in answer("plan", "strip", *(f"--set={key}" for key in keys))
 
 
-def test_a_rule_for_make(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_rule_for_make(answer: Answer, call: Call, tmp_path: Path) -> None:
     file, target, rule = tmp_path / "s.yaml", tmp_path / "s.json", tmp_path / "s.d"
     file.write_text(STRIP)
-    assert answer(capsys, "plan", "strip", str(file), "-q", "-o", str(target), "--depfile", str(rule)) == ""
+    assert answer("plan", "strip", str(file), "-q", "-o", str(target), "--depfile", str(rule)) == ""
     assert rule.read_text() == f"{target}: {file}\n\n{file}:\n"
-    assert main(["plan", "model", "--depfile", str(rule)]) == 2
-    assert "needs a target" in capsys.readouterr().err
+    found, _, err = call("plan", "model", "--depfile", str(rule))
+    assert (found, "needs a target" in err) == (2, True)
 
 
 @pytest.mark.slow
-def test_the_picture_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_picture_of_a_strip(answer: Answer, call: Call, tmp_path: Path) -> None:
     target = tmp_path / "strip.svg"
     options = ("strip", "--set=models=3", "--set=methods=[similarity]")
     drawn = []
     for _ in range(2):
-        assert answer(capsys, "plan", *options, "-q", "-o", str(target)) == ""
+        assert answer("plan", *options, "-q", "-o", str(target)) == ""
         drawn.append(target.read_text(encoding="utf-8"))
     assert drawn[0] == drawn[1]
-    document = json.loads(answer(capsys, "plan", *options, "--format", "json"))
+    document = json.loads(answer("plan", *options, "--format", "json"))
     for layout in nonempty(document["layouts"]):
         assert drawn[0].count(f">{layout['name']}, similarity<") == 1  # in one legend
         assert f">{layout['name']}<" in drawn[0]
-    assert main(["plan", "model", "-o", str(tmp_path / "model.svg")]) == 2
-    assert "nothing is written as '.svg'" in capsys.readouterr().err
+    found, _, err = call("plan", "model", "-o", str(tmp_path / "model.svg"))
+    assert (found, "nothing is written as '.svg'" in err) == (2, True)
 
 
 # -------------------------------------------------------------------------------------------------- displacements
 
 
 @pytest.mark.slow
-def test_displacements_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_displacements_from_keys_and_from_a_file(answer: Answer, tmp_path: Path) -> None:
     options = ("--set=camera=UMK 10/1318", "--set=base=30", "--set=distances=[50, 120]", "--set=sigma_um=4")
-    from_options = answer(capsys, "plan", "displacement", *options, "--format", "json")
+    from_options = answer("plan", "displacement", *options, "--format", "json")
     file = tmp_path / "d.yaml"
     file.write_text(
         "photostrip_plan_displacement: 1\nbase: 30\ndistances: [50, 120]\nsigma_d_um: 5.656854249492381\n"
         "camera: UMK 10/1318\n"
     )
-    assert answer(capsys, "plan", "displacement", str(file), "--format", "json") == from_options
+    assert answer("plan", "displacement", str(file), "--format", "json") == from_options
     document = json.loads(from_options)
     assert [row["distance_m"] for row in document["points"]] == [50, 50, 50, 120, 120, 120]
     assert document["points"][0]["sigma_y_m"] == pytest.approx(50**2 / (30 * 100) * 0.008, abs=1e-6)
-    text = answer(capsys, "plan", "displacement", options[0], "--set=stations=1")
+    text = answer("plan", "displacement", options[0], "--set=stations=1")
     assert "one, distances known" in text
 
 
@@ -403,22 +395,22 @@ def test_displacements_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.slow
-def test_screening_from_keys_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_screening_from_keys_and_from_a_file(answer: Answer, tmp_path: Path) -> None:
     keys = ("zone_points=[3, 3, 3, 3, 3, 3]", "error_sizes_um=[50, 100]", "methods=[tau, auto]", "repetitions=1")
     options = [f"--set={key}" for key in keys]
-    from_options = answer(capsys, "plan", "screening", *options, "--format", "json")
+    from_options = answer("plan", "screening", *options, "--format", "json")
     file = tmp_path / "s.yaml"
     file.write_text(
         "photostrip_plan_screening: 1\nzone_points: [3, 3, 3, 3, 3, 3]\nerror_sizes_um: [50, 100]\n"
         "methods: [tau, auto]\nrepetitions: 1\n"
     )
-    assert answer(capsys, "plan", "screening", str(file), "--format", "json") == from_options
+    assert answer("plan", "screening", str(file), "--format", "json") == from_options
     document = json.loads(from_options)
     assert [each["method"] for each in document["methods"]] == ["tau", "auto"]
-    rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "screening", str(file), "--format", "csv"))))
+    rows = list(csv.DictReader(io.StringIO(answer("plan", "screening", str(file), "--format", "csv"))))
     assert len(rows) == 2 * 6 * 2
     assert sum(int(row["errors"]) for row in rows) == 2 * 44
     first = document["effects"][0]
     assert first["largest_100_um_arcmin"] == pytest.approx(2 * first["largest_50_um_arcmin"], abs=0.02)
-    text = answer(capsys, "plan", "screening", str(file))
+    text = answer("plan", "screening", str(file))
     assert "What one undetected error does to the elements, minutes of arc" in text

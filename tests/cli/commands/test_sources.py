@@ -9,17 +9,12 @@ import math
 
 import pytest
 
-from photostrip.cli.main import main
+from tests.calls import Answer
 from tests.loops import nonempty
 
 
-def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(["sources", *arguments]) == 0
-    return capsys.readouterr().out
-
-
-def test_worked_numbers_are_those_of_the_formulas(capsys: pytest.CaptureFixture[str]) -> None:
-    document = json.loads(answer(capsys, "--format", "json"))
+def test_worked_numbers_are_those_of_the_formulas(answer: Answer) -> None:
+    document = json.loads(answer("sources", "--format", "json"))
     found = {(row["source"], row["what"]): row for row in document["worked"]}
     seconds = math.degrees(1) * 3600
     # [002]: m rho / sqrt(2 (f² + x²)) and m rho / sqrt(f² + x² + z²), m = 5 µm, x = 80, z = 60 mm
@@ -44,14 +39,14 @@ def test_worked_numbers_are_those_of_the_formulas(capsys: pytest.CaptureFixture[
     assert len(found) == len(document["worked"]) == 26
 
 
-def test_every_form_has_every_table(capsys: pytest.CaptureFixture[str]) -> None:
-    document = json.loads(answer(capsys, "--format", "json"))
-    markdown = answer(capsys, "--format", "md").replace("\\", "")
+def test_every_form_has_every_table(answer: Answer) -> None:
+    document = json.loads(answer("sources", "--format", "json"))
+    markdown = answer("sources", "--format", "md").replace("\\", "")
     for row in nonempty(document["equations"]):
         assert row["function"] in markdown
         assert row["command"] in markdown
-    text = " ".join(answer(capsys).split())
+    text = " ".join(answer("sources").split())
     for row in nonempty(document["misprints"]):
         assert " ".join(f"{row['place']}: {row['printed']}".split()) in text
-    rows = list(csv.DictReader(io.StringIO(answer(capsys, "--format", "csv"))))
+    rows = list(csv.DictReader(io.StringIO(answer("sources", "--format", "csv"))))
     assert [row["what"] for row in rows] == [row["what"] for row in document["worked"]]

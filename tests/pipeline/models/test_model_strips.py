@@ -14,8 +14,8 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.strip import control_search
-from photostrip.strip.model_links import LinkSettings
+from photostrip.strip import control_screening
+from photostrip.strip.linked_models import LinkSettings
 from tests.loops import nonempty
 from tests.models import inputs, truth
 from tests.simulated import inputs_of
@@ -69,7 +69,7 @@ def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str,
 @pytest.mark.parametrize("coordinates", [100, 27])
 def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordinates: int) -> None:
     """In sections, too."""
-    monkeypatch.setattr(control_search, "LARGEST_SECTION", coordinates)
+    monkeypatch.setattr(control_screening, "LARGEST_SECTION", coordinates)
     given = truth(8, 3, 4)
     noise = np.random.default_rng(1).normal(size=(len(given.model), 3))
     whole = inputs(given, given.measured(noise), bands=5)

@@ -16,8 +16,8 @@ from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
 from photostrip.formats.output.simulation import project_files
 from photostrip.notes import LOST_SAY
+from photostrip.pipeline import gate
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
 from photostrip.plausibility import KINDS
 from photostrip.simulation import (

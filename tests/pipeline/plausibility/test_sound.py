@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks import causes
 from photostrip.notes import LOST_SAY
+from photostrip.pipeline import gate
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Gnss, Image, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations

@@ -18,6 +18,7 @@ from photostrip.planning.deformation import (
     fit_paraboloid,
     paraboloid_rows,
     parallax_error,
+    relative_errors,
     rigorous_covariance,
     surface_of_elements,
 )
@@ -62,6 +63,18 @@ def test_numbers_computed_apart(vector: Vector) -> None:
     assert surface == pytest.approx([want[name] for name in ("E0", "A", "B", "C", "D")], rel=rel)
     assert paraboloid_rows(xy) @ surface == pytest.approx(want["dZ_mm"], rel=rel)
     assert ground_errors(xy, c, m, f, b)[:, 2] == pytest.approx(want["dZ_mm"], rel=1e-9)
+
+
+def test_relative_errors_are_differentials_of_the_normal_case() -> None:
+    """Eq. 10.7: X = N x, Y = N y, Z = -N f with N = B / p, by differences."""
+
+    def place(base: float, f: float, x: float, y: float, p: float) -> Floats:
+        return base / p * np.array([x, y, -f])
+
+    at, errors = np.array([900.0, 150.0, 40.0, 70.0, 85.0]), np.array([0.09, 0.02, 0.005, -0.004, 0.003])
+    found = relative_errors(at[2:], at[1], errors[2:], base=errors[0] / at[0], principal_distance=errors[1])
+    change = (place(*(at + errors / 2)) - place(*(at - errors / 2))) / place(*at)
+    assert found == pytest.approx(change, rel=1e-6)
 
 
 def test_the_printed_22_micrometres_are_21() -> None:

@@ -23,7 +23,7 @@ from photostrip.planning.single_model import (
     orientation_operator,
     parameter_rows,
 )
-from photostrip.strip.relative_orientation import standard_points
+from photostrip.strip import relative_orientation
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import intersected, orientation_parameters, six_point_variances
 from tests.vectors import cases
@@ -189,8 +189,10 @@ def test_six_standard_points_have_the_printed_variances() -> None:
     f, a, b = 100.0, 65.0, 70.0
     points = np.array([[x, y, f] for y in (0.0, a, -a) for x in (0.0, b)])
     dependent = element_covariance(points, b, 0.01)
-    turn = standard_points.dependent_from_base(b)
-    assert dependent == pytest.approx(1e-4 * turn @ standard_points.cofactors(f, a, b) @ turn.T, rel=1e-9, abs=1e-16)
+    turn = relative_orientation.dependent_from_base(b)
+    assert dependent == pytest.approx(
+        1e-4 * turn @ relative_orientation.cofactors(f, a, b) @ turn.T, rel=1e-9, abs=1e-16
+    )
     free = free_covariance(dependent, b)
     assert np.diag(free) == pytest.approx(six_point_variances(0.01, f, a, b))
     sd = np.sqrt(np.diag(free))

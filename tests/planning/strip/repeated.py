@@ -10,9 +10,9 @@ import numpy as np
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.network.adjustment import solve
+from photostrip.pipeline.formed_photos import form_strip
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
-from photostrip.pipeline.strips.method import adjust_formed
-from photostrip.pipeline.strips.photos import form_strip
+from photostrip.pipeline.strip_method import adjust_formed
 from photostrip.planning.ideal_strip import (
     BUNDLE,
     DEGREES,
@@ -26,7 +26,7 @@ from photostrip.planning.ideal_strip import (
 )
 from photostrip.points import ControlPoints
 from photostrip.strip import polynomial
-from photostrip.strip.relative_orientation.orientation import RelativeSettings
+from photostrip.strip.relative_orientation import RelativeSettings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photostrip.plausibility import flight_order, mosaic, units
+from photostrip.plausibility import flight, mosaic, units
 from photostrip.points import PhotoPoints
 from photostrip.simulation import Flight, Spec, simulate
 
@@ -33,7 +33,7 @@ def simulation(heading: float = 70.0, end_lap: float = 62.0) -> Simulation:
 
 def found(observations: PhotoPoints, photos: Sequence[str]) -> list[Finding]:
     """Examine a strip."""
-    return flight_order.find_wrong_order(observations, "A", photos)[0]
+    return flight.find_wrong_order(observations, "A", photos)[0]
 
 
 def codes(findings: Sequence[Finding]) -> list[str]:
@@ -59,7 +59,7 @@ def test_a_sound_strip_has_no_finding_in_either_direction(heading: float, lap: f
     turned = changed(made.observations, photos[2], np.exp(1j * turn))  # a photo turned in the comparator is no mistake
     assert found(turned, photos) == []
     assert found(turned, photos[::-1]) == []
-    assert flight_order.find_wrong_order(turned, "A", photos)[1].photos == photos
+    assert flight.find_wrong_order(turned, "A", photos)[1].photos == photos
 
 
 @pytest.mark.parametrize(
@@ -92,4 +92,4 @@ def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
         bases=(np.array([1.0, 1.0, 1.0, 5.0]) + 0j, -np.array([1.0, 1.0, 1.0, 5.0]) + 0j),
         count=np.array([6, 6, 6, 6]),
     )
-    assert flight_order._steps(cast("mosaic.PhotoLinks", links), [2, 0, 3, 1]) == pytest.approx([1.0] * 4)
+    assert flight._steps(cast("mosaic.PhotoLinks", links), [2, 0, 3, 1]) == pytest.approx([1.0] * 4)

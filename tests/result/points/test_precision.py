@@ -17,9 +17,10 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Precision
 from photostrip.report.page.layout import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
+from photostrip.result.derived import ellipses
 from photostrip.result.document import document_of
 from photostrip.result.points.own_precision import normalised
-from photostrip.result.points.precision import COVARIANCES, ellipses
+from photostrip.result.points.precision import CORRELATIONS
 from tests.loops import nonempty
 from tests.results import FRAMES, Case, case, result_files, solved
 
@@ -70,7 +71,7 @@ def test_the_ellipse_is_that_of_the_eigenvectors() -> None:
     covariances = positive(np.random.default_rng(3), 3, 50, 1.0)
     axes, azimuth = ellipses(covariances)
     values, vectors = np.linalg.eigh(covariances[:, :2, :2])
-    assert axes == pytest.approx(np.sqrt(values[:, ::-1]), rel=1e-9)
+    assert pytest.approx(np.sqrt(values[:, ::-1]), rel=1e-9) == axes.T
     direction = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
     assert np.abs((direction * vectors[:, :, 1]).sum(axis=1)) == pytest.approx(1.0, abs=1e-9)
     assert (azimuth >= 0).all()
@@ -113,15 +114,11 @@ def test_photo_covariances_are_those_of_turned_photos(frame: str) -> None:
     along = (errors[:, :3] @ axes.T)[:, list(result.output.order)]
     scatter = np.cov(np.column_stack([along, moved]).T)
     row = known.document["photos"][number]
-    expected = np.zeros((6, 6))
-    expected[np.triu_indices(6)] = [known.document["covariances"][number][name] for name in COVARIANCES]
+    expected = [known.document["correlations"][number][name] for name in CORRELATIONS]
     spread = np.sqrt(np.diag(scatter))
     assert [row[f"sigma_{axis}"] for axis in "xyz"] == pytest.approx(spread[:3], rel=0.01)
     assert [row[f"sigma_angle_{k}"] for k in (1, 2, 3)] == pytest.approx(spread[3:], rel=0.01)
-    upper = np.triu_indices(6)
-    assert expected[upper] == pytest.approx(scatter[upper], abs=0.012 * float(np.outer(spread, spread)[upper].max()))
-    correlation = (expected / np.outer(spread, spread))[upper]
-    assert correlation == pytest.approx((scatter / np.outer(spread, spread))[upper], abs=0.012)
+    assert expected == pytest.approx((scatter / np.outer(spread, spread))[np.triu_indices(6, 1)], abs=0.012)
 
 
 def test_tables_carry_the_precision() -> None:
@@ -177,7 +174,7 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
     assert "precision" not in document
     assert all(point["sigma_x"] is None and "cov_xy" not in point for point in nonempty(document["points"]))
     assert all(photo["sigma_x"] is None for photo in nonempty(document["photos"]))
-    assert "covariances" not in document
+    assert "correlations" not in document
     files = result_files(document)
     assert {row["sigma_x"] for row in csv.DictReader(StringIO(files["points.csv"]))} == {""}
     assert {row["sigma_kappa_deg"] for row in csv.DictReader(StringIO(files["photos.csv"]))} == {""}

@@ -13,7 +13,7 @@ from photostrip.pipeline.precision import photo_errors
 from photostrip.pipeline.run import triangulate
 from photostrip.strip import fitted_strip as fitted
 from photostrip.strip import polynomial
-from photostrip.strip.scale_transfer import StripFormationSettings
+from photostrip.strip.formed_strip import StripFormationSettings
 from tests.derivatives import (
     UNSCREENED,
     differenced,

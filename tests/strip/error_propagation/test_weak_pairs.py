@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.strip.relative_orientation.orientation import orient_pairs
-from photostrip.strip.relative_orientation.pairs import Pairs
-from photostrip.strip.relative_orientation.solution import base_rays, solve_elements, turns
+from photostrip.strip.relative_orientation import Pairs, base_rays, orient_pairs, solve_elements, turns
 from photostrip.strip.strip_errors import times_a_good_pair
 
 if TYPE_CHECKING:

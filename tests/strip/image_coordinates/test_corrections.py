@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
-from photostrip.strip import corrections, lens_distortion
+from photostrip.strip import corrections
 from photostrip.strip.corrections import (
     Bending,
     ImageCorrectionSettings,
@@ -135,10 +135,10 @@ def test_the_jacobian_agrees_with_differences(distortion: Distortion, points: Fl
         [points - h * unit_vector for unit_vector in np.eye(2)],
     )
     columns = [
-        (a + lens_distortion.shift(a, distortion) - b - lens_distortion.shift(b, distortion)) / (2 * h)
+        (a + corrections.distortion_shift(a, distortion) - b - corrections.distortion_shift(b, distortion)) / (2 * h)
         for a, b in zip(*ways, strict=True)
     ]
-    assert np.allclose(lens_distortion.jacobian(points, distortion), np.stack(columns, -1), rtol=0, atol=1e-7)
+    assert np.allclose(corrections.distortion_jacobian(points, distortion), np.stack(columns, -1), rtol=0, atol=1e-7)
 
 
 # ------------------------------------------------------------------------------------------- tables
@@ -149,7 +149,7 @@ def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
     nodes, values = np.array(distortion.radius), np.array(distortion.distortion)
     other = CubicSpline(np.append(-nodes[:0:-1], nodes), np.append(-values[:0:-1], values), bc_type="not-a-knot")
     radius = np.linspace(0, 170, 1001)
-    found = lens_distortion.shift(np.stack([radius, np.zeros_like(radius)], -1), distortion)
+    found = corrections.distortion_shift(np.stack([radius, np.zeros_like(radius)], -1), distortion)
     assert np.abs(found[:, 0] - other(radius)).max() < 1e-12
     assert not found[:, 1].any()
 
@@ -186,7 +186,7 @@ def test_points_beyond_the_table_are_refused_by_name(direction: str) -> None:
 )
 def test_distortion_that_folds_the_photo_is_refused(direction: str, k1: float, folds: bool) -> None:
     camera = replace(PLAIN, distortion=brown(direction, (k1, 0.0, 0.0)))
-    found = lens_distortion.faults(camera)
+    found = corrections.distortion_faults(camera)
     assert bool(found) == folds
     if folds:
         # r (1 + k1 r^2) turns back where 1 + 3 k1 r^2 = 0; radii are tried in steps of at most 1 % of the corner's

@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
-from photostrip.strip.lens_distortion import image_from_ideal
+from photostrip.strip.corrections import image_from_ideal
 from photostrip.strip.pixel_cameras import CONVENTIONS, PixelCamera, in_millimetres
 
 if TYPE_CHECKING:

@@ -15,16 +15,16 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import ModelStrip, Settings
-from photostrip.pipeline.strips.models import form_models, models_of
-from photostrip.strip import model_links
-from photostrip.strip.model_links import LinkSettings
+from photostrip.pipeline.strip_method import form_models, models_of
+from photostrip.strip import linked_models
+from photostrip.strip.linked_models import LinkSettings
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import ModelPoints
-    from photostrip.strip.model_strip import FormedModels
+    from photostrip.strip.linked_models import FormedModels
 
     Floats = NDArray[np.float64]
 
@@ -54,8 +54,8 @@ def test_the_estimate_is_that_of_a_general_optimiser() -> None:
     true = truth(2, 4, 3)
     measured = true.measured(np.random.default_rng(1).normal(size=(len(true.model), 3)), (0.01, 0.02, 0.05))
     models = models_of(strip_of(measured), measured, LinkSettings())
-    shared = model_links.common(models)
-    solved = model_links.solve(shared, models, np.ones(len(shared.link), bool))
+    shared = linked_models.common(models)
+    solved = linked_models.solve(shared, models, np.ones(len(shared.link), bool))
     a, b = models.xyz[shared.before], models.xyz[shared.after]
     middle = b.mean(axis=0)
     start = solved.similarities

@@ -17,8 +17,7 @@ from photostrip.pipeline.inputs import Settings as RunSettings
 from photostrip.pipeline.run import triangulate
 from photostrip.strip import polynomial
 from photostrip.strip.absolute_orientation import PointPrecision, weights
-from photostrip.strip.polynomial import FitProblem, PolynomialSettings, fit
-from photostrip.strip.polynomial_terms import DROP_ORDER, LADDER, POWERS, choose_terms
+from photostrip.strip.polynomial import DROP_ORDER, LADDER, POWERS, FitProblem, PolynomialSettings, choose_terms, fit
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.strips import MICROMETRE, control_points, fly, project, targets

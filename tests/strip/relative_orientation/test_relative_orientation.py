@@ -18,19 +18,18 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.strip.fitted_strip import image_variance
-from photostrip.strip.intersection import intersect
-from photostrip.strip.relative_orientation.orientation import (
-    assess_pairs,
-    orient_pairs,
-    orient_unchecked,
-)
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs
-from photostrip.strip.relative_orientation.solution import (
+from photostrip.strip.formed_strip import intersect
+from photostrip.strip.relative_orientation import (
     ITERATIONS,
+    MINIMUM_POINTS,
+    assess_pairs,
     base_rays,
+    collect_pairs,
     in_front_of_cameras,
     linearised_parallaxes,
     normal_matrices,
+    orient_pairs,
+    orient_unchecked,
     solve_elements,
     start_values,
     y_parallaxes,
@@ -55,7 +54,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.strip.relative_orientation.orientation import Orientation
+    from photostrip.strip.relative_orientation import Orientation
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]

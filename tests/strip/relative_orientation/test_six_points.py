@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
-from photostrip.strip.relative_orientation import standard_points
+from photostrip.strip import relative_orientation
 from tests.loops import nonempty
 from tests.strips import attitude
 from tests.vectors import cases
@@ -82,9 +82,9 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
     assert found.closing_error == pytest.approx(expected["closing_W"], rel=rel)
     assert found.sigma == pytest.approx(expected["m_q"], rel=rel)
     assert np.allclose(found.residuals, expected["residuals"], rtol=rel, atol=0)
-    q = standard_points.cofactors(f, a, b)
+    q = relative_orientation.cofactors(f, a, b)
     assert np.allclose(q, expected["cofactor"], rtol=rel, atol=1e-18)
-    t = standard_points.dependent_from_base(b)
+    t = relative_orientation.dependent_from_base(b)
     dependent = t @ q @ t.T
     formulas = expected["cofactor_formulas"]
     values = {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.strip.relative_orientation.standard_points import zones
+from photostrip.strip.relative_orientation import zones
 from tests.strips import true_pairs
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa, from_vector
-from photostrip.strip.ray_intersection import intersect_points
-from photostrip.strip.resection import KnownPhotos, project, space_resection
+from photostrip.strip.resection import KnownPhotos, intersect_points, project, space_resection
 from tests.draws import orthogonal_normal
 from tests.source_tree import ROOT
 

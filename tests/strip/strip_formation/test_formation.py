@@ -12,14 +12,16 @@ from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.points import PhotoPoints
 from photostrip.strip.formed_strip import (
+    SCALE_TRANSFERS,
     FormedStrip,
+    StripFormationSettings,
     _refuse_vertical_base,
     form_from_pairs,
     hand_on_rotations,
+    mean_ratios,
+    transfer_scale,
 )
-from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.scale_transfer import SCALE_TRANSFERS, StripFormationSettings, mean_ratios, transfer_scale
+from photostrip.strip.relative_orientation import Orientation, collect_pairs, orient_pairs
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
 from tests.vectors import cases

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.strip.intersection import intersect
+from photostrip.strip.formed_strip import intersect
 from tests.loops import nonempty
 from tests.strips import attitude, photograph
 from tests.vectors import cases

@@ -17,14 +17,13 @@ from scipy.stats import norm
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import ControlPoints
 from photostrip.strip.absolute_orientation import Targets
-from photostrip.strip.control_screening import FoundErrors, reliability
-from photostrip.strip.control_search import StripAtControl, adjust
+from photostrip.strip.control_screening import FoundErrors, StripAtControl, adjust, reliability
 from photostrip.strip.fitted_strip import Misclosures
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.strip.control_search import JointAdjustment
+    from photostrip.strip.control_screening import JointAdjustment
 
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.float64]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from photostrip.geodesy.tying import tie_frames
+from photostrip.pipeline.formed_photos import form_strip
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.method import adjust_formed
-from photostrip.pipeline.strips.photos import form_strip
+from photostrip.pipeline.strip_method import adjust_formed
 from tests.much_wrong_control import two_fifths_wrong
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.strip import pair_screening, pair_search
-from photostrip.strip.pair_search import GlobalTest
-from photostrip.strip.relative_orientation import solution
-from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
+from photostrip.strip import pair_screening, relative_orientation
+from photostrip.strip.pair_screening import GlobalTest
+from photostrip.strip.relative_orientation import RelativeSettings, orient_again, orient_unchecked
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, TruePairs, batch, true_pairs
 from tests.vectors import Vector, cases
@@ -22,8 +21,7 @@ from tests.vectors import Vector, cases
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.strip.relative_orientation.orientation import Orientation
-    from photostrip.strip.relative_orientation.pairs import Pairs
+    from photostrip.strip.relative_orientation import Orientation, Pairs
 
     Floats = NDArray[np.float64]
 
@@ -57,8 +55,8 @@ def test_a_gain_is_what_an_adjustment_without_the_points_loses(seed: int, n: int
     design, values = rng.normal(size=(n, 5)), rng.normal(size=n)
     matrix = np.eye(n) - design @ np.linalg.pinv(design)
     residual = matrix @ values
-    sets = pair_search.subsets(n, k)
-    found = pair_search.gains(residual[None], matrix[None], sets)[0]
+    sets = pair_screening.subsets(n, k)
+    found = pair_screening.gains(residual[None], matrix[None], sets)[0]
     for place in nonempty(rng.choice(len(sets), 5)):
         rest = np.setdiff1d(np.arange(n), sets[place])
         squares = np.linalg.lstsq(design[rest], values[rest], rcond=None)[1][0]
@@ -78,11 +76,11 @@ def test_the_search_finds_the_best_of_all_sets(seed: int, n: int, wrong: int) ->
     residual, basis = adjusted(np.random.default_rng(seed), n, wrong)
     target = np.array([chi2_quantile(0.9995, n - 5 - k) if n - k >= 6 else -np.inf for k in (1, 2, 3)])
     matrix = np.eye(n) - basis @ basis.transpose(0, 2, 1)
-    (found,) = pair_search.smallest_sets(residual, basis, target)
+    (found,) = pair_screening.smallest_sets(residual, basis, target)
     total = float((residual**2).sum())
     for k in (1, 2, 3):
-        sets = pair_search.subsets(n, k)
-        gain = pair_search.gains(residual, matrix, sets)[0]
+        sets = pair_screening.subsets(n, k)
+        gain = pair_screening.gains(residual, matrix, sets)[0]
         if total - gain.max() <= target[k - 1]:
             assert found.tolist() == sets[gain.argmax()].tolist()
             return
@@ -137,9 +135,9 @@ def test_a_sigma_stated_far_too_small_costs_no_good_points(understated: float) -
 @pytest.mark.parametrize("wrong", [0.55, 1.0])
 def test_what_no_search_can_put_right_is_given_up(wrong: float, monkeypatch: pytest.MonkeyPatch) -> None:
     from_nothing, again = list[int](), list[int]()
-    solve, oriented = solution.solve_elements, orient_again
+    solve, oriented = relative_orientation.solve_elements, orient_again
 
-    def counted_solves(pairs: Pairs) -> solution.Solved:
+    def counted_solves(pairs: Pairs) -> relative_orientation.Solved:
         from_nothing.append(pairs.size)
         return solve(pairs)
 
@@ -147,8 +145,8 @@ def test_what_no_search_can_put_right_is_given_up(wrong: float, monkeypatch: pyt
         again.append(1)
         return oriented(*arguments)
 
-    monkeypatch.setattr(solution, "solve_elements", counted_solves)
-    monkeypatch.setattr(pair_search, "orient_again", counted_rounds)
+    monkeypatch.setattr(relative_orientation, "solve_elements", counted_solves)
+    monkeypatch.setattr(pair_screening, "orient_again", counted_rounds)
     rng = np.random.default_rng(16)
     flown = level(16, 3, (20,) * 6)
     rows = rng.random(len(flown.pairs.left)) < wrong

@@ -9,9 +9,13 @@ import pytest
 
 from photostrip.statistics import grubbs_limit
 from photostrip.strip import pair_screening
-from photostrip.strip.relative_orientation.orientation import RelativeSettings, assess_pairs, orient_pairs
-from photostrip.strip.relative_orientation.pairs import collect_pairs
-from photostrip.strip.relative_orientation.solution import solve_elements
+from photostrip.strip.relative_orientation import (
+    RelativeSettings,
+    assess_pairs,
+    collect_pairs,
+    orient_pairs,
+    solve_elements,
+)
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, TruePairs, batch, gruber, measured, true_pairs
 from tests.vectors import cases
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.rejection import Rejection
-    from photostrip.strip.relative_orientation.orientation import Orientation
+    from photostrip.strip.relative_orientation import Orientation
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]

@@ -1,1 +1,0 @@
-"""One file for each command, ``shell`` and ``info`` for two: its arguments, then load, call, print, exit code."""

@@ -1,1 +1,0 @@
-"""What is too long for the file of its command, a module for each job."""

@@ -1,0 +1,645 @@
+"""Given coordinates: where they lie on the Earth, and how they go with each formed strip.
+
+Given coordinates by the adjustment: what it predicts of them, and how well.
+
+Check points, and what the search took out, are predicted by all that took part.
+
+Given positions and orientations of cameras against the control and against the strips.
+
+Where the control lies in what it has to hold: a strip of photos or models by itself, or a block of strips.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.crs import areas_of_use
+from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.tying import tie_frames
+from photostrip.geometry.rotation import from_angles
+from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.notes import Finding
+from photostrip.pipeline import control_readings, evidence, shared_errors
+from photostrip.pipeline.evidence import HeldStrip, ImageEvidence
+from photostrip.pipeline.formed_photos import FormedPhotos
+from photostrip.pipeline.given_points import cartesian_of, rejected_control, rows_of_given
+from photostrip.pipeline.inputs import GivenOrientations, Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.results import Result
+from photostrip.pipeline.strip_method import LinkedModels, link_strip
+from photostrip.plausibility import flight, found, given_points, units
+from photostrip.plausibility import flight as given_angles
+from photostrip.plausibility.given_points import LIMIT
+from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
+from photostrip.statistics import SIGMA_FROM_MEDIAN
+from photostrip.strip.control_screening import HEIGHT
+from photostrip.strip.linked_models import FormedModels
+
+PLAIN = FrameSpec("local", GROUND_AXES)
+
+
+@dataclass(frozen=True, eq=False)
+class GivenControl:
+    """Control and check points with their frames, and what their place on the Earth says of how to read them."""
+
+    points: ControlPoints
+    frames: Sequence[GroundFrame]
+    findings: tuple[Finding, ...]  # P401, P402, P403, by the place alone
+    as_written: bool  # whether the frames cannot be right, so that the numbers count as plain metres
+    axes_are_right: bool | None  # None where the place does not say
+
+    @classmethod
+    def placed(cls, inputs: Inputs, frames: Sequence[GroundFrame], directory: Path | None) -> Self:
+        """Find out where given points lie on the Earth, list by list."""
+        control = inputs.control
+        places = [
+            units.find_wrong_place(
+                frame,
+                areas_of_use(inputs.frames[number], directory=directory),
+                control.enu[(control.frame == number) & control.use[:, 0]],
+                number,
+            )
+            for number, frame in enumerate(frames)
+        ]
+        sure = {place.sure for place in places}
+        return cls(
+            control,
+            frames,
+            findings=tuple(finding for place in places for finding in place.findings),
+            as_written=not any(place.inside for place in places),
+            axes_are_right=sure.pop() if len(sure) == 1 else None,
+        )
+
+    @cached_property
+    def read_in(self) -> Sequence[GroundFrame]:
+        """Frames in which strips are laid on the points: plain ones where their own cannot be right."""
+        return tie_frames([PLAIN] * len(self.frames))[0] if self.as_written else self.frames
+
+
+@dataclass(frozen=True)
+class OfStrip:
+    """What a formed strip says of the given points that it shows."""
+
+    whole: list[Finding] = field(default_factory=list)  # of all of them, or of a list: P103, P105, P107, P401 to P410
+    slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
+
+
+def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
+    """Compare the given points with a formed strip, as they are given and as they may be read."""
+    strip, points = stage.strip.id, control.points
+    held = HeldStrip.of(stage, points, settings)
+    if not len(held.given):
+        return OfStrip()
+    as_given = held.read(points, control.read_in, as_given=True)
+    whole = control_readings.of_heights(held, as_given)
+    if whole:
+        return OfStrip(whole)
+    better = control_readings.find_reading(held, points, control.read_in, as_given)
+    if better is not None:
+        whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))
+    else:
+        whole += control_readings.of_whole_control(held, as_given, points, control.read_in)
+        whole += [] if whole or as_given is None else shared_errors.of_formed(as_given, stage)
+    laid, reading = (as_given, control_readings.AS_GIVEN) if better is None else (better.laid, better.reading)
+    if laid is None or not laid.fits or reading.rows or (whole and better is None):
+        return OfStrip(whole)
+    given = given_points.level(points.take(held.given), control.frames, as_written=control.as_written)
+    if given is None:
+        return OfStrip(whole)
+    off, sigma = laid.off
+    off = reading.as_written(off, signed=True) + given.moved * given.steps.unit
+    named = [given.ids.index(name) for name in whole[0].points] if whole else []
+    off[named] = np.nan  # of a list that lies beside the others
+    return OfStrip(whole, list(given_points.find_slips(given, off, reading.as_written(sigma, signed=False), (strip,))))
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Given coordinates as an adjustment in which they took no part predicts them, worked out when it is asked for.
+
+    Check points and rejected control are predicted.
+    """
+
+    result: Result
+
+    @cached_property
+    def _used(self) -> Flags:
+        """Control coordinates (c, 3) that took part."""
+        result, control = self.result, self.result.inputs.control
+        rejected = rejected_control(result)
+        for strip in result.model_strips:
+            rows = locate(strip.control.ids, control.ids)
+            rejected[rows] |= control.use[rows] & ~strip.control.use
+        used = control.use & ~control.check[:, None] & ~rejected & (result.control_rows >= 0)[:, None]
+        return np.asarray(used, bool)
+
+    @cached_property
+    def off(self) -> Floats:
+        """Given minus predicted (c, 3), metres along the axes of each point's frame; NaN where not known."""
+        return np.where(self._used, np.nan, -self.result.control_differences)
+
+    @cached_property
+    def sigma(self) -> Floats:
+        """Standard deviations (c, 3) of these differences; NaN without a precision."""
+        result, control, precision = self.result, self.result.inputs.control, self.result.precision
+        sigma = np.full(control.use.shape, np.nan)
+        for number, frame in enumerate(result.frames):
+            rows = np.flatnonzero((control.frame == number) & (result.control_rows >= 0))
+            if len(rows) and precision is not None:
+                at = result.control_rows[rows]
+                axes = frame.axes_at(result.points.cartesian[at])
+                with np.errstate(invalid="ignore"):  # a variance lost to rounding is not known
+                    sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
+        return np.asarray(np.hypot(sigma, np.where(control.sigma > 0, control.sigma, 0.0)), float)
+
+    @cached_property
+    def sound(self) -> Flags:
+        """Control coordinates (c, 3) that took part: the run tested them and found them right."""
+        return self._used & _tested(self.result)
+
+    def agree(self, use: Flags) -> Flags:
+        """Given points (c,) whose coordinates `use` (c, 3) the adjustment predicts, or tested and kept."""
+        near = np.abs(self.off) <= LIMIT * self.sigma
+        return np.asarray((self.sound | near | ~use).all(axis=1))
+
+    @cached_property
+    def spread(self) -> Floats:
+        """Standard deviations (c, 3), larger where the others are predicted worse than by theirs."""
+        ratio, spread = np.abs(self.off / self.sigma), np.array(self.sigma)
+        for columns in ([0, 1], [HEIGHT]):
+            odd = ratio[:, columns] > LIMIT
+            for row in np.flatnonzero(odd.any(axis=1)).tolist():
+                others = np.delete(ratio, row, axis=0)[:, columns]
+                others = others[np.isfinite(others)]
+                spread[row, columns] *= max(SIGMA_FROM_MEDIAN * np.median(others), 1.0) if len(others) else 1.0
+        return spread
+
+
+def is_doubtful(stage: FormedPhotos, result: Result, predicted: Predicted) -> bool:
+    """Whether the given points of a strip may be wrong: no bundle has seen them, or some do not agree with it."""
+    if result.bundle is None:
+        return True
+    control = result.inputs.control
+    shown = rows_of_given(control.ids, stage.formed.point, result.refined.observations.point_ids) >= 0
+    return bool((shown & ~predicted.agree(control.use)).any())
+
+
+def _tested(result: Result) -> Flags:
+    """Given coordinates (c, 3) that the run could test for gross errors, and of which it doubts none."""
+    settings, control = result.settings, result.inputs.control
+    tested = np.full(control.use.shape, result.bundle is not None and settings.bundle.screening != "none")
+    if result.bundle is None and (settings.links if result.model_strips else settings.relative).screening != "none":
+        for strip in result.strips:
+            rows = locate(strip.control.ids, control.ids)
+            tested[rows] |= np.isfinite(strip.screened_control.redundancy)
+    doubtful = {name for note in result.notes if note.code == "control-doubtful" for name in note.points}
+    tested[[name in doubtful for name in control.ids]] = False
+    return tested
+
+
+def of_result(result: Result, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
+    """Name slips of given coordinates that the adjustment predicts, and that took no part or were not tested."""
+    given = given_points.level(control.points, control.frames, as_written=control.as_written)
+    if given is None or result.precision is None:
+        return
+    asked = np.isfinite(predicted.off) & ~predicted.sound
+    if not (asked & (np.abs(predicted.off) > LIMIT * predicted.sigma)).any() and not given.moved.any():
+        return  # what the axes are where they are written takes long to say
+    unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in control.frames])
+    projected = np.array([frame.kind == "projected" for frame in control.frames])[control.points.frame]
+    # differences count by map coordinates: a map has a scale of its own
+    scale = np.where(projected[:, None], given.steps.unit / unit[control.points.frame], 1.0)
+    scale[:, HEIGHT] = 1.0
+    yield from given_points.find_slips(given, predicted.off * scale, predicted.spread, asked=asked)
+
+
+LEAST_POINTS = 3  # points that carry a similarity
+LEAST_BREADTH = 0.05  # second over first extent of control, below which it says nothing of the roll
+MOST_REFITS = 4  # of leaving out what does not fit
+KEPT_SIGMAS = 5.0  # middle misclosures within which a point goes with the others
+MOST_HEIGHT_RATIO = 1.3  # flying height given over that of the photo scale, or the other way round, that is reported
+LEAST_HEIGHTS = 3  # photos whose flying height is known from their scale
+FIXES = {
+    "P204": "are the positions heights above the ground, in another unit, or of another vertical datum than the "
+    "control?",
+    "P205": "is the height of that row right, and does it belong to that photo?",
+    "P206": "are positions missing, or do some belong to other photos?",
+    "P207": "do some positions belong to other photos, or does the strip bend there?",
+}
+
+
+class GivenCenters(NamedTuple):
+    """Perspective centres as they are given."""
+
+    key: str  # where they stand in the project file
+    frame: FrameSpec
+    photos: tuple[str, ...]  # those whose centre is given in full
+    enu: Floats  # (n, 3)
+    sigma: float  # usual standard deviation of a coordinate, metres; 0 where none is stated
+
+
+class LevelPlan(NamedTuple):
+    """Perspective centres and control points in one level plane: east, north and height, metres."""
+
+    key: str
+    photos: tuple[str, ...]
+    centers: Floats  # (n, 3)
+    sigma: float
+    ids: tuple[str, ...]
+    control: Floats  # (c, 3)
+
+
+class Shown(NamedTuple):
+    """Image points of control."""
+
+    photo: Numbers
+    number: Numbers  # of the control point, in the level plane
+    xy: Floats
+
+
+def centers(
+    inputs: Inputs,
+    observations: PhotoPoints,
+    strips: Sequence[Strip],
+    directory: Path | None = None,
+    *,
+    starts: bool = False,
+) -> Iterator[Finding]:
+    """Look at given perspective centres: below the ground, at another height, with bases that jump.
+
+    observations: image points in the system of the photo, mm.
+    strips: the strips, their photos as they lie.
+    starts: whether those that are only a start count as well: they may be far off, and matter where a run fails.
+    """
+    control = inputs.control.take(inputs.control.use.all(axis=1) & ~inputs.control.check)
+    for given in _given_centers(inputs, starts=starts):
+        if not given.photos:
+            continue
+        try:
+            tied, target = tie_frames([given.frame, *inputs.frames], inputs.output or given.frame, directory=directory)
+            plan = _level_plan(given, control, tied, target)
+        except (GeometryError, InputError):
+            continue  # what is wrong with the frames stops the run itself
+        number = locate(observations.point_ids, plan.ids)[observations.point]
+        rows = np.flatnonzero(number >= 0)
+        shown = Shown(photo=observations.photo[rows], number=number[rows], xy=observations.xy[rows])
+        for strip in strips:
+            yield from _off_plan(strip, plan, shown, observations.photo_ids)
+
+
+def _given_centers(inputs: Inputs, *, starts: bool) -> Iterator[GivenCenters]:
+    positions, orientations = inputs.positions, inputs.orientations
+    if positions is not None:
+        whole = np.flatnonzero(positions.use.all(axis=1))
+        photos = tuple(positions.photos[row] for row in whole)
+        yield GivenCenters(
+            key="camera_positions",
+            frame=positions.frame,
+            photos=photos,
+            enu=positions.enu[whole],
+            sigma=_usual(positions.sigma[whole]),
+        )
+    if orientations is not None and (orientations.observed or starts):
+        whole = np.flatnonzero(np.isfinite(orientations.enu).all(axis=1))
+        photos = tuple(orientations.photos[row] for row in whole)
+        yield GivenCenters(
+            key="orientations",
+            frame=orientations.frame,
+            photos=photos,
+            enu=orientations.enu[whole],
+            sigma=_usual(orientations.sigma[whole]),
+        )
+
+
+def _usual(sigma: Floats) -> float:
+    stated = sigma[np.isfinite(sigma)]
+    return float(np.median(stated)) if len(stated) else 0.0
+
+
+def _level_plan(
+    given: GivenCenters, control: ControlPoints, tied: Sequence[GroundFrame], target: GroundFrame
+) -> LevelPlan:
+    """Bring perspective centres and control points to one level plane with heights above the ellipsoid."""
+    together = np.concatenate([tied[0].cartesian_from_ground(given.enu), cartesian_of(control, tied[1:])])
+    middle = np.median(together, axis=0)
+    level = (together - middle) @ target.level_axes_at(middle[None, :])[0].T
+    if target.kind != "local":  # the Earth falls away from a plane
+        level[:, 2] = target.geodetic(together)[:, 2]
+    count = len(given.photos)
+    return LevelPlan(
+        key=given.key,
+        photos=given.photos,
+        centers=level[:count],
+        sigma=given.sigma,
+        ids=control.ids,
+        control=level[count:],
+    )
+
+
+def _off_plan(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[str]) -> Iterator[Finding]:
+    rows = locate(strip.photos, plan.photos)
+    photos = tuple(photo for photo, row in zip(strip.photos, rows, strict=True) if row >= 0)
+    if not photos:
+        return
+    xyz = plan.centers[rows[rows >= 0]]
+    height, ratio = _ground_below(locate(photos, photo_ids), xyz, plan, shown, strip.camera.principal_distance)
+    usual = float(np.ptp(xyz[:, :2], axis=0).max())
+    depth = xyz[:, 2] - height if np.isfinite(height).all() else np.full(len(photos), max(usual, 1.0))
+    findings = list(flight.find_odd_centers(xyz, depth, np.array([0.0, 0.0, 1.0]), photos, strip.id, plan.sigma))
+    below = {photo for each in findings if each.code == "P204" for photo in each.photos}
+    known = np.isfinite(ratio) & (depth > 0)
+    times = np.median(ratio[known]) if known.sum() >= LEAST_HEIGHTS else 1.0
+    if not below and not 1.0 / MOST_HEIGHT_RATIO < times < MOST_HEIGHT_RATIO:
+        findings = [_other_height(strip, plan, photos, depth[known], depth[known] / ratio[known])]
+    for each in findings:
+        fix = FIXES[each.code] if each.code != "P205" or len(each.photos) == 1 else each.fix
+        yield replace(each, message=f"{plan.key}: {each.message}", fix=fix, key=plan.key)
+
+
+def _ground_below(
+    photos: Numbers, centers: Floats, plan: LevelPlan, shown: Shown, focal: float
+) -> tuple[Floats, Floats]:
+    """Height of the ground under each photo, and how many times too far its centre is given from the control it shows.
+
+    The angles between rays say that, whichever way the camera looks.
+    """
+    height, ratio = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
+    order = np.argsort(shown.photo, kind="stable")
+    first, last = np.searchsorted(shown.photo[order], photos), np.searchsorted(shown.photo[order], photos, "right")
+    for place in np.flatnonzero(first < last).tolist():
+        rows = order[first[place] : last[place]]
+        ground = plan.control[shown.number[rows]]
+        height[place] = np.median(ground[:, 2])
+        given = _spread(ground - centers[place])
+        measured = _spread(np.column_stack([shown.xy[rows], np.full(len(rows), -focal)]))
+        ratio[place] = measured / given if len(rows) > 1 and given > 0 and measured > 0 else np.nan
+    known = np.isfinite(height)
+    if known.any():
+        height = np.interp(np.arange(len(photos)), np.flatnonzero(known), height[known])
+    return height, ratio
+
+
+def _spread(rays: Floats) -> float:
+    """Spread of directions."""
+    unit = rays / np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
+    return float(np.sqrt(((unit - unit.mean(axis=0)) ** 2).sum()))
+
+
+def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: Floats, wanted: Floats) -> Finding:
+    message = (
+        f"the perspective centres of strip {strip.id} are given {np.median(depth):.4g} m above the control, and the "
+        f"scale of the photos requires {np.median(wanted):.4g} m"
+    )
+    numbers = {"given_above_control_m": np.median(depth), "by_photo_scale_m": np.median(wanted)}
+    fix = "are their heights in another unit, or of another vertical datum? or is the principal distance wrong?"
+    return found("P205", message, fix, numbers, photos=photos, strips=(strip.id,), key=plan.key)
+
+
+def angles(
+    inputs: Inputs,
+    formed: Sequence[FormedPhotos],
+    observations: PhotoPoints,
+    directory: Path | None = None,
+) -> list[Finding]:
+    """Compare given angles with those of strips on their control, whatever an adjustment made of them (P601, P602)."""
+    given = inputs.orientations
+    if given is None:
+        return []
+    try:
+        tied, _ = tie_frames([given.frame, *inputs.frames], inputs.output or given.frame, directory=directory)
+        laid = [(each, _on_control(each, observations, inputs.control, tied[1:])) for each in formed]
+        held = [(each, similarity) for each, similarity in laid if similarity is not None]
+        turned = {
+            photo: rotation
+            for each, similarity in held
+            for photo, rotation in zip(each.strip.photos, _rotations(each, similarity, tied[0]), strict=True)
+        }
+        norths = [tied[0].convergence(similarity(each.formed.centers)) for each, similarity in held]
+    except (GeometryError, InputError):
+        return []
+    photos = [photo for photo in given.photos if photo in turned]
+    if not photos:
+        return []
+    rotations = np.array([turned[photo] for photo in photos])
+    north = float(np.median(np.concatenate(norths)))
+    return wrong_angles(given, photos, rotations, north)
+
+
+def wrong_angles(given: GivenOrientations, photos: Sequence[str], rotations: Floats, north: float) -> list[Finding]:
+    """Compare the given angles of some photos with rotations found (n, 3, 3), in the readings that they can have."""
+    angles = given.angles[locate(photos, given.photos)]
+    if given.stated:
+        return list(given_angles.find_wrong_angles(angles, given.system, rotations, photos, north))
+    stated = from_angles(angles, given.system)
+    return list(given_angles.find_wrong_rotations(stated, rotations, photos, north))
+
+
+def _rotations(formed: FormedPhotos, similarity: Similarity, frame: GroundFrame) -> Floats:
+    axes = frame.axes_at(similarity(formed.formed.centers))
+    return np.asarray(axes @ similarity.rotation @ formed.formed.rotations, float)
+
+
+def _on_control(
+    formed: FormedPhotos, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame]
+) -> Similarity | None:
+    """Similarity from the strip to its control; None where that does not hold all rotations."""
+    strip = formed.formed
+    counts = control.use.all(axis=1) & ~control.check
+    places = rows_of_given(control.ids, strip.point, observations.point_ids)
+    rows = np.flatnonzero(counts & (places >= 0))
+    source, target = strip.xyz[places[rows]], cartesian_of(control.take(rows), frames)
+    keep = np.ones(len(rows), bool)
+    for _ in range(MOST_REFITS):
+        if keep.sum() < LEAST_POINTS or collinearity(target[keep]) < LEAST_BREADTH:
+            return None
+        similarity = Similarity.from_points(source[keep], target[keep])
+        off = np.linalg.norm(similarity.residuals(source, target), axis=1)
+        keep = off <= KEPT_SIGMAS * max(np.median(off), 1e-9)
+    return similarity
+
+
+UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
+
+
+@dataclass(frozen=True, eq=False)
+class ModelStripEvidence:
+    """A strip of models with centres, and the given points in it."""
+
+    strip: ModelStrip
+    centers: Floats  # (f, 3): perspective centres of the photos that have one, in strip coordinates
+    photos: tuple[str, ...]
+    depth: Floats  # (f,): height of each above the points of its models
+    rows: Numbers  # rows of the given points that the strip holds
+    place: Floats  # place of each of them along the strip in bases, from 0 at the first photo
+    breadth: float  # half breadth of the strip over its length
+
+
+def form_strips(models: MeasuredModels, settings: Settings) -> Iterator[LinkedModels]:
+    """Form the strips that can be formed, for evidence alone."""
+    for strip in models.strips:
+        try:
+            yield link_strip(strip, models.points, settings)
+        except (GeometryError, np.linalg.LinAlgError):
+            continue
+
+
+def model_strips(
+    strips: Iterable[LinkedModels], point_ids: tuple[str, ...], control: ControlPoints
+) -> Iterator[ModelStripEvidence]:
+    """Collect what the gate looks at in strips that have two perspective centres."""
+    for linked in strips:
+        if np.isfinite(linked.formed.centers[:, 0]).sum() > 1:
+            yield _evidence(linked.strip, linked.formed, control, point_ids)
+
+
+def _evidence(
+    strip: ModelStrip, formed: FormedModels, control: ControlPoints, point_ids: tuple[str, ...]
+) -> ModelStripEvidence:
+    known = np.flatnonzero(np.isfinite(formed.centers[:, 0]))
+    centers, depth = formed.centers[known], _depths(formed)[known]
+    places = rows_of_given(control.ids, formed.point, point_ids)
+    rows = np.flatnonzero(places >= 0)
+    xyz = formed.xyz[places[rows]]
+    along = np.interp(xyz[:, 0], centers[:, 0], known.astype(float))
+    length = max(float(np.ptp(centers[:, 0])), 1e-9)
+    breadth = np.quantile(np.abs(formed.xyz[:, 1] - np.median(formed.xyz[:, 1])), 0.95) / length
+    return ModelStripEvidence(
+        strip=strip,
+        centers=centers,
+        photos=tuple(strip.photos[k] for k in known.tolist()),
+        depth=depth,
+        rows=rows,
+        place=along,
+        breadth=breadth,
+    )
+
+
+def _depths(formed: FormedModels) -> Floats:
+    """Heights of the centres above the points of their models, strip coordinates; NaN without a centre."""
+    models = formed.models
+    point = (models.node < models.points) & formed.used
+    count = np.bincount(models.model[point], minlength=models.count)
+    ground = np.bincount(models.model[point], formed.model_xyz[point, 2], models.count) / np.maximum(count, 1)
+    both = np.concatenate([ground[:1], (ground[1:] + ground[:-1]) / 2, ground[-1:]])
+    return np.asarray(formed.centers[:, 2] - both)
+
+
+def weak_layout(
+    inputs: Inputs, settings: Settings, images: ImageEvidence, control: GivenControl | None, directory: Path | None
+) -> Iterator[Finding]:
+    """Look where the control lies: along each strip and across, or in the block that a bundle makes of all strips."""
+    if control is None:
+        return
+    in_bundle = settings.together
+    cameras = _cameras(inputs) if in_bundle else None
+    strips = [strip for strip in images.strips if len(strip.photos) > 1]
+    if in_bundle and (cameras is not None or len(images.strips) > 1):
+        yield from _of_block(inputs, strips, images, control, cameras, directory)
+        return
+    for strip in strips:
+        held = _of_photos(strip, images, control)
+        yield from _of_strip(strip, held, _half_breadth(strip, images, held))
+
+
+def weak_layout_of_models(held: ModelStripEvidence, control: GivenControl) -> Iterator[Finding]:
+    """Look where the control of a strip of models lies along it and across."""
+    in_plan = _in_plan(control, held.rows, held.place)
+    breadth = float(held.breadth * np.linalg.norm(np.ptp(in_plan.plan, axis=0))) if in_plan.names else 0.0
+    yield from _of_strip(held.strip, in_plan, breadth)
+
+
+class HeldInPlan(NamedTuple):
+    """Given points that hold the plan of a strip."""
+
+    names: list[str]
+    place: Floats  # along the strip
+    plan: Floats  # (n, 2), metres
+
+
+def _of_strip(strip: Strip | ModelStrip, held: HeldInPlan, breadth: float) -> Iterator[Finding]:
+    yield from given_points.find_line(held.plan, breadth, held.names, f"strip {strip.id}", (strip.id,))
+    yield from given_points.find_weak_ends(held.place, strip.photos, strip.id, held.names)
+
+
+def _of_photos(strip: Strip, images: ImageEvidence, control: GivenControl) -> HeldInPlan:
+    return _in_plan(control, *evidence.places_along_strip(strip, images.observations, control.points, images.steps))
+
+
+def _in_plan(control: GivenControl, rows: Numbers, place: Floats) -> HeldInPlan:
+    """Those of some given points that hold the plan."""
+    counts = control.points.use[rows, 0] & ~control.points.check[rows]
+    points = control.points.take(rows[counts])
+    given = given_points.level(points, control.frames)
+    if given is None:
+        return HeldInPlan([], place[:0], np.zeros((0, 2)))
+    return HeldInPlan(list(points.ids), place[counts], given.xyz[:, :2])
+
+
+class HeldCameras(NamedTuple):
+    """Cameras whose position takes part in a bundle."""
+
+    points: ControlPoints  # as if they were control
+    frame: FrameSpec
+
+
+def _cameras(inputs: Inputs) -> HeldCameras | None:
+    """Cameras whose position is given in full and takes part in a bundle; None without any."""
+    positions, orientations = inputs.positions, inputs.orientations
+    if positions is not None:
+        photos, enu, frame = positions.photos, positions.enu, positions.frame
+        whole = np.asarray(positions.use.all(axis=1), bool)
+    elif orientations is not None and orientations.observed:
+        photos, enu, frame = orientations.photos, orientations.enu, orientations.frame
+        whole = np.asarray(np.isfinite(enu).all(axis=1), bool)
+    else:
+        return None
+    points = ControlPoints(
+        ids=photos,
+        enu=enu,
+        use=np.repeat(whole[:, None], 3, axis=1),
+        check=np.zeros(len(enu), bool),
+        sigma=np.full(enu.shape, np.nan),
+        frame=np.full(len(enu), len(inputs.frames)),
+    )
+    return HeldCameras(points.take(whole), frame) if whole.any() else None
+
+
+def _of_block(
+    inputs: Inputs,
+    strips: list[Strip],
+    images: ImageEvidence,
+    control: GivenControl,
+    cameras: HeldCameras | None,
+    directory: Path | None,
+) -> Iterator[Finding]:
+    """Look whether all that is known on the ground stands on one line; cameras hold a block as control does."""
+    shown = np.isin(control.points.ids, images.observations.point_ids)
+    rows = np.flatnonzero(shown & control.points.use[:, 0] & ~control.points.check)
+    points, frames = control.points.take(rows), list(control.frames)
+    names = points.ids
+    if cameras is not None:
+        try:
+            frames, _ = tie_frames([*inputs.frames, cameras.frame], inputs.output, directory=directory)
+        except (GeometryError, InputError):
+            return
+        points = concatenated([points, cameras.points])
+    given = given_points.level(points, frames)
+    if given is None:
+        return
+    plan = given.xyz[:, :2]
+    halves = (_half_breadth(strip, images, _of_photos(strip, images, control)) for strip in strips)
+    breadth = next((half for half in halves if half > 0), 0.0)
+    what = f"strip {strips[0].id}" if len(strips) == 1 else "the block"
+    yield from given_points.find_line(plan, breadth, names, what, [strip.id for strip in strips])
+
+
+def _half_breadth(strip: Strip, images: ImageEvidence, held: HeldInPlan) -> float:
+    return evidence.half_breadth(strip, images.observations, held.names, held.plan, held.place, images.steps)

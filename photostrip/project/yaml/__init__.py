@@ -1,1 +1,0 @@
-"""YAML files: from text to a model with types, and to faults with file, line, column and key."""
