@@ -69,7 +69,7 @@ def report(
     saved = read_result(file)
     with faults_of_edited("reported", (saved, file)):
         document = as_reported(saved, file)
-        sections_of(document, everything=True)  # what is incomplete is refused, whatever is printed
+        sections_of(document)  # what is incomplete is refused, whatever is printed
         if plots is not None:
             from photostrip.report.pictures.result import picture_files
 

@@ -31,7 +31,7 @@ KINDS = {"point": "point", "photo": "photo", "photos": "photo"}  # heads of firs
 
 def to_html(document: Document) -> str:
     """Return the report of a result as one HTML file: style, pictures and script are in it, no link to elsewhere."""
-    named = list(named_sections(document, everything=True))
+    named = list(named_sections(document))
     return _page(title_of(document), document["version"], _sections(named, pictures_of(document)))
 
 

@@ -19,8 +19,6 @@ PRINTED = {"um": "µm", "arcsec": "″", "arcmin": "′", "percent": "%", "ratio
 DECIMALS = {"": "2", "m": "3", "um": "1", "ppm": "0", "arcsec": "1"}  # of printed numbers, by their unit
 DIGITS = "g4"  # of numbers without a natural size
 BETWEEN = " – "  # of the photos of a pair
-ALL_SHOWN = 24  # rows up to which a table is printed whole
-WORST_SHOWN = 12  # rows shown of a longer one
 LEAST_PROBABILITY = 0.001  # smaller ones are all shown as smaller than this
 Number = float | None
 
@@ -252,20 +250,18 @@ def worst_first(
     rows: Any,  # noqa: ANN401 (the same)
     by: str | Sequence[float],
     where: tuple[str, str, str],
-    *,
-    everything: bool,
-    most: int = ALL_SHOWN,
+    most: int | None,
 ) -> tuple[Any, str]:
     """Choose the rows of a table that are shown: all in their order, or the worst, and what to say of the others.
 
     by: a key, or a number for each row: how bad it is.
     where: what the rows are, which section shows all of them and which block of the result holds them.
-    most: how many rows are shown whole.
+    most: how many rows are shown; None: all.
     """
-    if everything or len(rows) <= most:
+    if most is None or len(rows) <= most:
         return rows, ""
     sizes = [abs(size or 0.0) for size in column_of(rows, by)] if isinstance(by, str) else by
-    places = nlargest(min(most, WORST_SHOWN), range(len(rows)), key=sizes.__getitem__)
+    places = nlargest(most, range(len(rows)), key=sizes.__getitem__)
     return taken(rows, places), f"worst first; {elsewhere(len(rows) - len(places), *where)}"
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import product
 from math import hypot
 from typing import Any
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.parts import Facts, Part, Section, Words
+from photostrip.report.page.parts import Facts, Part, Words
 from photostrip.report.page.tables import (
     Field,
     angle_unit,
@@ -18,36 +17,31 @@ from photostrip.report.page.tables import (
     keyed,
     metres,
     micrometres,
-    note_of,
     percent,
     signed,
     tabulated,
-    worst_first,
 )
 from photostrip.report.sections.project import of_models
 
 HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place
-STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 ELEMENTS = "alpha1", "kappa1", "alpha2", "omega2", "kappa2"
 COORDINATES = "x", "y", "divided by"
 DIRECTIONS = ("along", "across", "up")
 GROUND_AXES = ("east", "north", "up")
 
 
-def fiducials_section(document: Document, *, everything: bool) -> Section:
-    """Interior orientation: the transformation of each photo, and what is left at its marks."""
-    rows, marks = document["fiducials"], document["fiducial_marks"]
-    lengths = [hypot(*each) for each in zip(marks.values("vx_um"), marks.values("vy_um"), strict=True)]
+def fiducials(document: Document) -> Iterator[Part]:
+    """Give the transformation of the marks of each photo, and what is left at them."""
+    if not len(document.get("fiducials", ())):
+        return
+    photos, marks = document["fiducials"], document["fiducial_marks"]
     largest: dict[str, float] = {}
-    for photo, length in zip(marks.values("photo"), lengths, strict=True):
-        largest[photo] = max(largest.get(photo, 0.0), length)
-    worst = [largest.get(photo, 0.0) for photo in rows.values("photo")]
-    where = ("photos", "fiducials", "fiducials")
-    photos, note = worst_first(rows, worst, where, everything=everything)
-    shown, rest = worst_first(marks, lengths, ("marks", "fiducials", "fiducial_marks"), everything=everything)
+    for mark in marks:
+        length = hypot(mark["vx_um"], mark["vy_um"])
+        largest[mark["photo"]] = max(largest.get(mark["photo"], 0.0), length)
     of_photos = Field("", "µm 1", "largest"), [largest.get(photo, 0.0) for photo in photos.values("photo")]
-    scale = "scale: photo over measured; turn, shear: counter-clockwise"
     keys = "photo transform marks sigma0_um largest scale_x scale_y rotation_deg:1 shear_deg:1 mirrored:2"
+    yield keyed(photos, keys, "scale: photo over measured; turn, shear: counter-clockwise", largest=of_photos)
     terms = (Field("photo"), Field("of"), *(Field(term, " g10") for term in ("x", "y", "xy", "1")))
     coefficients = [
         (row["photo"], of, *line)
@@ -55,12 +49,8 @@ def fiducials_section(document: Document, *, everything: bool) -> Section:
         for of, line in zip(COORDINATES, row["coefficients"], strict=True)
         if of in "xy" or row["transform"] == "projective"
     ]
-    tables = (
-        keyed(photos, keys, note_of(note, scale), largest=of_photos),
-        tabulated(terms, coefficients, "photo coordinates, mm, from the measured ones"),
-        keyed(shown, "photo mark vx_um vy_um", note_of(rest, "transformed minus calibrated")),
-    )
-    return Section("Interior orientation", tables)
+    yield tabulated(terms, coefficients, "photo coordinates, mm, from the measured ones")
+    yield keyed(marks, "photo mark vx_um vy_um", "transformed minus calibrated")
 
 
 def sigma0_of(summary: Document, key: str = "sigma0_um") -> str:
@@ -76,30 +66,27 @@ def pairs_line(document: Document) -> str:
     return f"{sigma0}; {out} of {total} rejected, {percent(out, out + used)}"
 
 
-def relative_section(document: Document, *, everything: bool) -> Section:
-    """Relative orientation: how good the image coordinates are, pair by pair."""
+def relative(document: Document) -> Iterator[Part]:
+    """Say how good the image coordinates are, pair by pair."""
     models, unit = document["models"], angle_unit(document)
-    where = ("pairs", "relative", "models")
-    shown, note = worst_first(models, "sigma0_um", where, everything=everything)
+    if of_models(document) or not len(models):  # single photos have none
+        return
     worst = max(models, key=lambda m: m["max_parallax_um"] or 0.0)
     largest = (
         f"{micrometres(worst['max_parallax_um'])} µm at point {worst['max_parallax_point']} of photos "
         f"{worst['left']} and {worst['right']}"
     )
     redundant = counted(document["summary"]["redundancy"], "redundant point")
-    facts = (("image coordinates", f"{pairs_line(document)}; {redundant}"), ("largest y parallax", largest))
+    yield Facts((("image coordinates", f"{pairs_line(document)}; {redundant}"), ("largest y parallax", largest)))
     pairs = (
         "left+right points_used points_rejected sigma0_um rms_parallax_um max_parallax_um max_parallax_point "
         "condition:2 base:1 base_direction_deg:3 base_inclination_deg:3 strip:4"
     )
-    sigmas = [column_of(shown, f"sigmas_{key}") for key in ELEMENTS]
-    least = [max((each for each in row if each is not None), default=None) for row in zip(*sigmas, strict=True)]
-    of_elements = Field("", f"{unit.name} ", "largest σ", rank=1), [unit.text(each, 4) for each in least]
-    tables = (
-        keyed(shown, pairs, note or "q: y parallax of the points used"),
-        keyed(shown, "left+right elements_* largest", note, largest=of_elements),
-    )
-    return Section("Relative orientation", (Facts(facts), *tables))
+    yield keyed(models, pairs, "q: y parallax of the points used")
+    sigmas = zip(*(models.values(f"sigmas_{key}") for key in ELEMENTS), strict=True)
+    most = [unit.text(max((each for each in row if each is not None), default=None), 4) for row in sigmas]
+    largest_sigma = Field("", f"{unit.name} ", "largest σ", rank=1), most
+    yield keyed(models, "left+right elements_* largest", largest=largest_sigma)
 
 
 def differences(document: Document) -> str:
@@ -119,17 +106,20 @@ def in_strip(strip: str, strips: Sequence[object]) -> str:
     return f", worst in strip {strip}" if len(strips) > 1 else ""
 
 
-def junction_section(document: Document, *, everything: bool) -> Section:
-    """Scale transfer: how well neighbouring models agree, and how the scale drifts."""
-    where = ("junctions", "junctions", "junctions")
-    shown, note = worst_first(document["junctions"], "spread_ppm", where, everything=everything)
-    keys = (
-        "photo points_used points_rejected factor:2 spread_ppm discrepancy_along discrepancy_across discrepancy_up "
-        "discrepancy_um_along:3 discrepancy_um_across:3 discrepancy_um_up:1 strip:4"
-    )
-    below = note or "rms differences of the pass points of two models; spread: of the scale ratio of one pass point"
-    table = keyed(shown, keys, below) if len(shown) else Words("One model: no scale was transferred.")
-    return Section("Scale transfer and junctions", (table, Facts(_by_strip(document, "scale drift", _drift))))
+def junctions(document: Document) -> Iterator[Part]:
+    """Say how well neighbouring models agree, and how the scale drifts."""
+    if of_models(document) or not len(document["models"]):
+        return
+    if not len(document["junctions"]):
+        yield Words("One model: no scale was transferred.")
+    else:
+        keys = (
+            "photo points_used points_rejected factor:2 spread_ppm discrepancy_along discrepancy_across discrepancy_up "
+            "discrepancy_um_along:3 discrepancy_um_across:3 discrepancy_um_up:1 strip:4"
+        )
+        note = "rms differences of the pass points of two models; spread: of the scale ratio of one pass point"
+        yield keyed(document["junctions"], keys, note)
+    yield Facts(_by_strip(document, "scale drift", _drift))
 
 
 def _by_strip(document: Document, label: str, say: Any) -> tuple[tuple[str, str], ...]:  # noqa: ANN401 (of a strip)
@@ -145,58 +135,60 @@ def _drift(strip: Document) -> str:
     return text if strip["discrepancy_up"] is None else f"{text}; rms differences between models {_between(strip)}"
 
 
-def links_section(document: Document, *, everything: bool) -> Section:
-    """Links: how good the model coordinates are, link by link."""
-    summary, links = document["summary"], document["links"]
-    if not len(links):
-        return Section("Links of the models", (Words("One model: nothing was linked."),))
-    shown, note = worst_first(links, "sigma0", ("links", "links", "links"), everything=everything)
-    worst = max(links, key=lambda link: (link["largest"] or 0.0) / (link["limit"] or 1.0))
+def links(document: Document) -> Iterator[Part]:
+    """Say how good the model coordinates are, link by link."""
+    if not of_models(document):
+        return
+    summary, rows = document["summary"], document["links"]
+    if not len(rows):
+        yield Words("One model: nothing was linked.")
+        return
+    worst = max(rows, key=lambda link: (link["largest"] or 0.0) / (link["limit"] or 1.0))
     largest = (
         f"{fixed(worst['largest'], 2)} at {worst['largest_point']} of models {worst['before']} and {worst['after']}, "
         f"limit {fixed(worst['limit'], 2)}"
     )
-    out = sum(map(len, links.values("points_rejected")))
-    total = out + sum(links.values("points_used")) + sum(links.values("center"))
+    out = sum(map(len, rows.values("points_rejected")))
+    total = out + sum(rows.values("points_used")) + sum(rows.values("center"))
     facts = (
         ("model coordinates", f"{sigma0_of(summary)}; redundancy {summary['redundancy']}"),
         ("largest test value", largest),
         ("rejected", f"{out} of {counted(total, 'common point')}, {percent(out, total)}"),
     )
+    yield Facts(facts)
     keys = (
         "before+after points_used center points_rejected sigma0 discrepancy_along discrepancy_across discrepancy_up "
-        "discrepancy_um_along:2 discrepancy_um_across:2 discrepancy_um_up:2 factor:2 far_end:1 detectable_um:3 strip:4"
+        "discrepancy_um_*:2 factor:2 far_end:1 detectable_um:3 strip:4"
     )
-    below = (
+    note = (
         "σ0: ratio to what is expected from the standard deviations of both models; along, across, up: rms differences "
         "of the common points; far end: uncertainty of the second model's far end, in standard deviations of a "
         "coordinate"
     )
-    return Section("Links of the models", (Facts(facts), keyed(shown, keys, note_of(note, below))))
+    yield keyed(rows, keys, note)
 
 
-def models_section(document: Document, *, everything: bool) -> Section:
-    """Models: what each one holds, and its scale."""
-    models = document["models"]
-    middle = document["summary"]["model_scale"] or 1.0
-    odd = [abs(scale / middle - 1) for scale in models.values("model_scale")]
-    shown, note = worst_first(models, odd, ("models", "models", "models"), everything=everything)
+def models(document: Document) -> Iterator[Part]:
+    """Say what each independent model holds, and its scale."""
+    if not of_models(document):
+        return
     placed = "has one position in the network" if "bundle" in document else "gets the mean of its positions"
-    text = (
+    yield Words(
         "The models are independent: each has its own scale, rotation and origin, and is linked to the model before "
         f"it. A point in several models {placed}. The rotations of the photos are not known from model coordinates."
     )
     counts: Counter[int] = Counter(document["points"].values("models"))
     facts = [("points by models", ", ".join(f"{counts[n]} in {counted(n, 'model')}" for n in sorted(counts)))]
     missing = [photo["id"] for photo in document["photos"] if photo["x"] is None]
-    facts += [("photos without a centre", ", ".join(missing))] if missing else []
-    keys = "id left+right points_used points_rejected centers model_scale base strip:2"
-    return Section("Models", (Words(text), Facts(tuple(facts)), keyed(shown, keys, note)))
+    yield Facts((*facts, *([("photos without a centre", ", ".join(missing))] if missing else [])))
+    yield keyed(document["models"], "id left+right points_used points_rejected centers model_scale base strip:2")
 
 
-def deformation_section(document: Document) -> Section:
-    """Twist and bending of the models that have the height control for it."""
-    rows = document["deformations"]
+def deformations(document: Document) -> Iterator[Part]:
+    """Give twist and bending of the models that have the height control for it."""
+    rows = document.get("deformations", ())
+    if not len(rows):
+        return
     bent = sum(rows.values("significant"))
     means = [
         f"{name} {signed(each['at_corner_m'])} m at a corner, t = {fixed(each['t'], 1)}"
@@ -209,15 +201,18 @@ def deformation_section(document: Document) -> Section:
     sound = not any(each["severity"] == "error" and not each["accepted"] for each in document.get("findings", []))
     common = f" On average over all models: {'; '.join(means)}." if means and sound else ""
     text = f"{enough} to show twist (x y) and bending (x²); {verdict} (t test of all together at 5 %).{common}"
+    yield Words(text, "look" if bent else "")
     keys = (
         "left+right points twist_at_corner_m twist_t bending_at_corner_m bending_t t_limit omega2_arcsec:2 "
         "alpha2_minus_alpha1_arcsec:2 strip:3"
     )
-    return Section("Deformation of models", (Words(text, "look" if bent else ""), keyed(rows, keys)))
+    yield keyed(rows, keys)
 
 
-def absolute_section(document: Document) -> Section:
-    """Absolute orientation: the fit of each strip to its control before any polynomial."""
+def absolute(document: Document) -> Iterator[Part]:
+    """Give the fit of each strip to its control before any polynomial."""
+    if not len(document["absolute"]):
+        return
     note = (
         "east, north, up: rms misclosures of the similarity; σ0: their ratio to what is expected from the "
         f"control and one model; scale: a unit is {'a millimetre' if of_models(document) else 'the first base'}"
@@ -226,8 +221,8 @@ def absolute_section(document: Document) -> Section:
         "strip control_plan control_height sigma0 redundancy condition:1 misclosure_rms_east misclosure_rms_north "
         "misclosure_rms_up scale:3 angles_deg_alpha:2 angles_deg_omega:2 angles_deg_kappa:2"
     )
-    weights = Facts(_by_strip(document, "weights", _weights))
-    return Section("Absolute orientation", (keyed(document["absolute"], keys, note), weights))
+    yield keyed(document["absolute"], keys, note)
+    yield Facts(_by_strip(document, "weights", _weights))
 
 
 def _weights(strip: Document) -> str:
@@ -247,34 +242,19 @@ def degrees(blocks: Sequence[Document]) -> str:
     )
 
 
-def polynomial_section(document: Document, *, everything: bool) -> Section:
-    """Polynomial adjustment: what was chosen, why, and how large it is."""
-    blocks = document["polynomials"]
-    if len(blocks) > STRIPS_SHOWN and not everything:
-        keys = "strip asked degree_plan degree_height stations_plan stations_height x y z"
-        note = "effect: largest term; evidence and terms: `polynomial_evidence`, `polynomial_terms` in result.json"
-        largest = dict.fromkeys(product(blocks.values("strip"), "xyz"), 0.0)
-        for row in document["polynomial_terms"]:
-            place = row["strip"], row["axis"]
-            largest[place] = max(largest.get(place, 0.0), abs(row["effect"]))
-        x, y, z = (
-            (Field(f"{axis.upper()} effect", "m 3"), [largest[strip, axis] for strip in blocks.values("strip")])
-            for axis in "xyz"
-        )
-        return Section("Polynomial adjustment", (keyed(blocks, keys, note, x=x, y=y, z=z),))
-    parts: list[Part] = []
-    for block in blocks:
+def polynomials(document: Document) -> Iterator[Part]:
+    """Say of each polynomial what was chosen, why, and how large it is."""
+    for block in document.get("polynomials", ()):
         evidence, terms = (document[f"polynomial_{name}"].where(strip=block["strip"]) for name in ("evidence", "terms"))
         by = sorted({each for each in evidence.values("left_out_by") if each})
         note = (
             f"rms: at the control; left out: at control held back, one {' or '.join(by) or 'point'} at a time; "
             "F, p: variance ratio of the gain in all three axes together, and its probability by chance"
         )
-        parts.append(Words(_choice(document, block) + _leverage(document, block)))
-        parts.append(keyed(evidence, "group degree terms:1 redundancy rms left_out f p accepted", note))
+        yield Words(_choice(document, block) + _leverage(document, block))
+        yield keyed(evidence, "group degree terms:1 redundancy rms left_out f p accepted", note)
         if len(terms):
-            parts.append(keyed(terms, "axis term coefficient sigma t effect", OF_COEFFICIENTS))
-    return Section("Polynomial adjustment", tuple(parts))
+            yield keyed(terms, "axis term coefficient sigma t effect", OF_COEFFICIENTS)
 
 
 def _leverage(document: Document, block: Document) -> str:

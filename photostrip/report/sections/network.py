@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import Any
 
 from photostrip.notes import Document, counted, listed
-from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Column, Facts, Part, Table, Words
 from photostrip.report.page.tables import Field, fixed, keyed, metres, short, signed, tabulated, written
 from photostrip.report.sections.formation import GROUND_AXES, degrees
 
@@ -20,7 +20,6 @@ ONE = {
     "position": "camera position coordinate",
     "attitude": "attitude angle",
 }
-CORRELATIONS_SHOWN = 12
 NAMED = 6
 # How a cause is said; any other is that of a camera or of a photo.
 SENTENCES = {
@@ -44,23 +43,10 @@ OF_RELIABILITY = (
 Row = tuple[str, str]
 
 
-def bundle_sections(document: Document, *, everything: bool) -> Iterator[Section]:
-    """Give the sections of a bundle adjustment; none without the block ``bundle``."""
-    block = document.get("bundle")
-    if block is None:
-        return
-    yield _adjustment(block)
-    yield _reliability(block["reliability"])
-    if len(block["variance_components"]):
-        text = "The stated standard deviations of each group, multiplied by its factor, were used."
-        table = keyed(block["variance_components"], "group observations redundancy factor sigma estimated")
-        yield Section("Variance components", (Words(text), table))
-    if any(len(block.get(key, ())) for key in ("calibration", "corrections", "taken_up")):
-        yield _parameters(document, everything=everything)
-
-
-def classical_section(document: Document) -> Section:
+def classical(document: Document) -> Iterator[Part]:
     """Set what polynomials would leave, strip by strip, beside what the bundle leaves."""
+    if "classical" not in document:
+        return
     block, summary = document["classical"], document["summary"]
     places = [(role, part) for role in ("control", "check") for part in ("plan", "height")]
     columns = (Field("rms"), *(Field(f"{role} {part}", "m 3") for role, part in places))
@@ -69,8 +55,8 @@ def classical_section(document: Document) -> Section:
         ("polynomials", *(block[f"{role}_rms"][part] for role, part in places)),
     )
     note = "the strip method by itself, from which the bundle started; `processing.adjustment: polynomial` takes it"
-    parts = (Words(f"Polynomials: {degrees(block['strips'])}."), tabulated(columns, rows, note))
-    return Section("The classical strip adjustment beside it", parts)
+    yield Words(f"Polynomials: {degrees(block['strips'])}.")
+    yield tabulated(columns, rows, note)
 
 
 def stages(document: Document, most: int) -> Iterator[Row]:
@@ -98,9 +84,20 @@ def _verdict(test: Document) -> str:
     return f"{'passed' if test['passed'] else 'NOT PASSED'} ({fixed(test['lower'], 3)} to {fixed(test['upper'], 3)})"
 
 
-def _adjustment(block: Document) -> Section:
+def bundle(document: Document) -> Iterator[Part]:
+    return _adjustment(document, "photos")
+
+
+def model_network(document: Document) -> Iterator[Part]:
+    return _adjustment(document, "models")
+
+
+def _adjustment(document: Document, units: str) -> Iterator[Part]:
+    """Give size, convergence and test of the adjustment of photos, or of models."""
+    block = document.get("bundle")
+    if block is None or units not in block["unknowns"]:
+        return
     test, unknowns = block["sigma0_test"], block["unknowns"]
-    units = "models" if "models" in unknowns else "photos"
     parts = f"{sum(unknowns.values())}: {unknowns[units]} of {units}, {unknowns['points']} of points"
     parts += f", {unknowns['common']} common" if unknowns["common"] else ""
     free = "free network: inner constraints on the points; positions and scale mean nothing, precision is relative"
@@ -117,9 +114,8 @@ def _adjustment(block: Document) -> Section:
         ("gross errors", _screening(block["screening"])),
     )
     note = "steps of the last adjustment, from the one before it; length: of the step, in standard deviations"
-    title = "Network of independent models" if units == "models" else "Bundle adjustment"
-    table = keyed(block["convergence"], "chi_square length damping shift turn_deg", note)
-    return Section(title, (Facts(facts), table))
+    yield Facts(facts)
+    yield keyed(block["convergence"], "chi_square length damping shift turn_deg", note)
 
 
 def _screening(screening: Document) -> str:
@@ -131,33 +127,40 @@ def _screening(screening: Document) -> str:
     return f"{screening['method']}, {test}, {level}: {out or 'none'} rejected, {screening['readmitted']} re-admitted"
 
 
-def _reliability(block: Document) -> Section:
-    groups = "group observations redundancy mean smallest uncontrolled detectable detectable_largest unit external"
-    parts: list[Part] = [keyed(block["groups"], groups, OF_RELIABILITY.format(100 * block["power"]))]
-    for title, rows in (("fit worst", block["worst"][:NAMED]), ("hardest to check", block["weakest"][:NAMED])):
+def reliability(document: Document) -> Iterator[Part]:
+    if "bundle" not in document:
+        return
+    block = document["bundle"]["reliability"]
+    keys = "group observations redundancy mean smallest uncontrolled detectable detectable_largest unit external"
+    yield keyed(block["groups"], keys, OF_RELIABILITY.format(100 * block["power"]))
+    for title, rows in (("fit worst", block["worst"][:NAMED]), ("are hardest to check", block["weakest"][:NAMED])):
         if len(rows):
             unit = "model" if "model" in rows.columns else "photo"
             keys = f"kind {unit} point axis redundancy standardised detectable unit effect"
-            parts.append(keyed(rows, keys, f"observations that {title.replace('hardest', 'are hardest')}"))
-    return Section("Reliability", tuple(parts))
+            yield keyed(rows, keys, f"observations that {title}")
 
 
-def _parameters(document: Document, *, everything: bool) -> Section:
-    """Calibration parameters, offsets and drifts, and what is hard to tell apart."""
-    block = document["bundle"]
-    shared = tuple(taken_up(block, NAMED))
-    parts: list[Part] = [Facts(shared)] if shared else []
+def variance_components(document: Document) -> Iterator[Part]:
+    rows = document.get("bundle", {}).get("variance_components", ())
+    if len(rows):
+        yield Words("The stated standard deviations of each group, multiplied by its factor, were used.")
+        yield keyed(rows, "group observations redundancy factor sigma estimated")
+
+
+def shared_parameters(document: Document) -> Iterator[Part]:
+    """Give calibration parameters, offsets and drifts, and what is hard to tell apart."""
+    block = document.get("bundle", {})
+    if not any(len(block.get(key, ())) for key in ("calibration", "corrections", "taken_up")):
+        return
+    if shared := tuple(taken_up(block, NAMED)):
+        yield Facts(shared)
     if len(block["calibration"]):
-        parts += _calibration(block["calibration"], pixel_sizes(document))
+        yield from _calibration(block["calibration"], pixel_sizes(document))
     if len(block["corrections"]):
         note = "added to the given positions of a strip; a drift is per unit of time"
-        parts.append(keyed(block["corrections"], "name value sigma", note))
+        yield keyed(block["corrections"], "name value sigma", note)
     if len(block["correlations"]):
-        shown = block["correlations"] if everything else block["correlations"][:CORRELATIONS_SHOWN]
-        more = len(block["correlations"]) - len(shown)
-        note = f"{counted(more, 'more pair')} in `bundle.correlations`" if more > 0 else ""
-        parts.append(keyed(shown, "first second value", note))
-    return Section("Parameters that photos share", tuple(parts))
+        yield keyed(block["correlations"], "first second value")
 
 
 def pixel_sizes(document: Document) -> dict[str, float]:

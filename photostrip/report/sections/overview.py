@@ -9,27 +9,21 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from photostrip.notes import Document, counted, listed
 from photostrip.report.page.layout import lay_out
-from photostrip.report.page.parts import Facts, Section, Words
+from photostrip.report.page.parts import Facts, Part, Section, Words
 from photostrip.report.page.tables import BETWEEN, elsewhere, largest_of, micrometres, taken
 from photostrip.report.sections import formation, network
 from photostrip.report.sections.points import (
-    check_section,
-    control_section,
-    cross_validation_section,
-    marks_section,
+    check,
+    control,
+    cross_validation,
+    marks,
     missing_points,
     precision_lines,
     sentence_of,
     standing_rejections,
 )
-from photostrip.report.sections.project import (
-    adjustment_of,
-    camera_line,
-    chosen_degrees,
-    counts_rows,
-    interior_line,
-)
-from photostrip.report.sections.verdict import cures_section, verdict_section
+from photostrip.report.sections.project import adjustment_of, camera_line, chosen_degrees, counts_rows, interior_line
+from photostrip.report.sections.verdict import cures, verdict
 
 Rows = Iterator[tuple[str, str]]
 
@@ -52,25 +46,26 @@ def overview(document: Document, width: int) -> tuple[Section, ...]:
 
 def _overview(document: Document, most: int) -> tuple[Section, ...]:
     remarks = [note for note in document["notes"] if note["severity"] != "warning"]  # warnings stand in the verdict
-    shown = (
-        verdict_section(document, most=most),
-        cures_section(document, most),
-        _facts("Project", _project(document, min(most, NAMED))),
-        _facts("Stages", _stages(document, min(most, NAMED))),
-        control_section(document, everything=False, most=most),
-        check_section(document, everything=False, most=most),
-        marks_section(document, everything=False, most=min(most, 2 * NAMED)),
-        *([cross_validation_section(document, everything=False, most=most)] if "cross_validation" in document else []),
-        _facts("Worst", _worst(document)),
-        _notes(remarks, most),
-        Section("", (Words("--verbose prints all sections, --section NAME a single one; --help lists the names."),)),
+    help_text = "--verbose prints all sections, --section NAME a single one; --help lists the names."
+    shown: tuple[tuple[str, Iterable[Part]], ...] = (
+        ("Verdict", verdict(document, most)),
+        ("Plausibility of the data", cures(document, most)),
+        ("Project", _facts(_project(document, min(most, NAMED)))),
+        ("Stages", _facts(_stages(document, min(most, NAMED)))),
+        ("Control points", control(document, most)),
+        ("Check points", check(document, most)),
+        ("Marks of given points", marks(document, min(most, 2 * NAMED))),
+        ("Cross-validation", cross_validation(document, most)),
+        ("Worst", _facts(_worst(document))),
+        ("Notes", _notes(remarks, most)),
+        ("", [Words(help_text)]),
     )
-    return tuple(section for section in shown if section.parts)
+    return tuple(Section(title, parts) for title, given in shown if (parts := tuple(given)))
 
 
-def _facts(title: str, rows: Rows) -> Section:
-    facts = tuple(rows)
-    return Section(title, (Facts(facts),) if facts else ())
+def _facts(rows: Rows) -> Iterator[Part]:
+    if facts := tuple(rows):
+        yield Facts(facts)
 
 
 def _project(document: Document, most: int) -> Rows:
@@ -135,15 +130,15 @@ def _and_more(said: Iterable[str], number: int, section: str) -> str:
     return ", ".join(said) + (f" and {number - NAMED} more: --section {section}" if number > NAMED else "")
 
 
-def _notes(notes: Iterable[Document], most: int) -> Section:
-    """Return the first note of each kind, and how many more there are of it."""
+def _notes(notes: Iterable[Document], most: int) -> Iterator[Part]:
+    """Give the first note of each kind, and how many more there are of it."""
     kinds: dict[str, list[Document]] = {}
     for note in notes:
         kinds.setdefault(note["code"], []).append(note)
-    parts = [Words(sentence_of(first) + _likewise(rest), mark="-") for first, *rest in list(kinds.values())[:most]]
+    for first, *rest in list(kinds.values())[:most]:
+        yield Words(sentence_of(first) + _likewise(rest), mark="-")
     if len(kinds) > most:
-        parts.append(Words(elsewhere(len(kinds) - most, "kinds of notes", "notes", "notes")))
-    return Section("Notes", tuple(parts))
+        yield Words(elsewhere(len(kinds) - most, "kinds of notes", "notes", "notes"))
 
 
 def _likewise(rest: Sequence[Document]) -> str:

@@ -11,13 +11,10 @@ from operator import itemgetter
 from typing import Any
 
 from photostrip.notes import Document, before, counted, listed
-from photostrip.report.page.parts import Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Facts, Part, Table, Words
 from photostrip.report.page.tables import (
-    ALL_SHOWN,
-    WORST_SHOWN,
     Field,
     column_of,
-    elsewhere,
     fields,
     fixed,
     keyed,
@@ -39,7 +36,6 @@ DIFFERENCES = ("dx", "dy", "dz")
 PARTS = "plan", "height"
 IDS_NAMED = 12
 WORST_POINTS = 8
-STATIONS_SHOWN = 12  # of the precision along a strip
 FAILED_SHOWN = 3  # folds of a cross-validation that could not be adjusted
 MOST_MARKS = 100  # marks: a page of a large block can still be mailed
 UNTESTED = dict.fromkeys(("plan", "height", "p_plan", "p_height"))
@@ -55,26 +51,22 @@ def _given(document: Document, role: str) -> Any:  # noqa: ANN401 (a table of a 
     return document["control"].where(role=role, measured=True)
 
 
-def control_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
+def control(document: Document, most: int | None = None) -> Iterator[Part]:
     rows = _given(document, "control")
     rows = rows[[use != "off" for use in rows.values("use")]]
-    text = (
+    wrong = " Coordinates with a minus under `use` were found wrong and were not used; the last lines leave them out."
+    yield Words(
         "Adjusted minus given. These points took part in the adjustment: what is left here is smaller than the errors "
-        "between them."
+        "between them." + wrong * any(rows.values("rejected"))
     )
-    if any(rows.values("rejected")):
-        text += (
-            " Coordinates with a minus under `use` were found wrong and were not used; the last lines leave them out."
-        )
-    table = given_table(document, rows, "control", everything=everything, most=most)
-    parts: list[Part] = [Words(text), table, *_unused(document)]
-    return Section("Control points", tuple(parts))
+    yield given_table(document, rows, "control", most)
+    yield from _unused(document)
 
 
-def given_table(document: Document, given: Any, role: str, *, everything: bool, most: int) -> Table:  # noqa: ANN401
+def given_table(document: Document, given: Any, role: str, most: int | None) -> Table:  # noqa: ANN401
     """Return the table of given points of a role with their differences, the worst first."""
     summary = document["summary"]
-    shown, note = worst_first(given, "normalised", ("points", role, "control"), everything=everything, most=most)
+    shown, note = worst_first(given, "normalised", ("points", role, "control"), most)
     used = Field("use"), [_used(row) for row in shown]
     known = (size for size, out in zip(given.values("normalised"), given.values("rejected"), strict=True) if not out)
     plan, height = summary[role]["plan"], summary[role]["height"]
@@ -122,8 +114,8 @@ def _largest(document: Document, rows: Sequence[Document]) -> dict[str, str]:
     return found
 
 
-def _unused(document: Document) -> list[Facts]:
-    """Given points that were not used, and why."""
+def _unused(document: Document) -> Iterator[Part]:
+    """Name given points that were not used, and say why."""
     rows = document["control"]
     refused = set(column_of(document["not_determined"], "id"))
     lost = rows.where(measured=False).values("id")
@@ -132,56 +124,55 @@ def _unused(document: Document) -> list[Facts]:
         "without coordinates": [name for name in lost if name in refused],
         "switched off": rows.where(measured=True, role="control", use="off").values("id"),
     }
-    facts = tuple((label, listed(names, IDS_NAMED)) for label, names in named.items() if names)
-    return [Facts(facts)] if facts else []
+    if facts := tuple((label, listed(names, IDS_NAMED)) for label, names in named.items() if names):
+        yield Facts(facts)
 
 
-def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
+def check(document: Document, most: int | None = None) -> Iterator[Part]:
     given = _given(document, "check")
     if not len(given):
         unproven = " What lies between the control points is not proven by anything in this report."
-        return Section("Check points", (Words("None." + unproven * ("cross_validation" not in document)),))
-    words = Words("Adjusted minus given: how good the new points are.")
-    check = document.get("precision", {}).get("check")
-    if not check or not len(check["points"]):
-        return Section("Check points", (words, given_table(document, given, "check", everything=everything, most=most)))
-    points, tests = document["points"].where(role="check"), check["points"]
-    known, tested = ({row["id"]: row for row in rows} for rows in (points, tests))
+        yield Words("None." + unproven * ("cross_validation" not in document))
+        return
+    yield Words("Adjusted minus given: how good the new points are.")
+    tests = document.get("precision", {}).get("check", {})
+    if not tests or not len(tests["points"]):
+        yield given_table(document, given, "check", most)
+        return
+    points = document["points"].where(role="check")
+    known, tested = ({row["id"]: row for row in rows} for rows in (points, tests["points"]))
     chances = [-_chance(tested[name]) if name in tested else -1.0 for name in given.values("id")]
-    shown, note = worst_first(given, chances, ("points", "check", "control"), everything=everything, most=most)
-    quantities = points.quantities | given.quantities | tests.quantities
+    shown, note = worst_first(given, chances, ("points", "check", "control"), most)
+    quantities = points.quantities | given.quantities | tests["points"].quantities
     blank = dict.fromkeys(quantities)
     rows = [blank | known.get(row["id"], {}) | row | UNTESTED | tested.get(row["id"], {}) for row in shown]
     odd = [row["id"] for row in given if row["stands_out"]]
     below = note_of(note, MEANING, f"rms of z without {listed(odd, IDS_NAMED)}" if odd else "")
-    seen = {part: (check[part]["rms"], check[part]) for part in PARTS}
-    table = _unseen(document, given, rows, seen, "use:2 strips:3", below, quantities)
-    return Section("Check points", (words, table))
+    seen = {part: (tests[part]["rms"], tests[part]) for part in PARTS}
+    yield _unseen(document, given, rows, seen, "use:2 strips:3", below, quantities)
 
 
-def cross_validation_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
-    """Differences at control that was left out in turn."""
+def cross_validation(document: Document, most: int | None = None) -> Iterator[Part]:
+    """Give differences at control that was left out in turn."""
+    if "cross_validation" not in document:
+        return
     block = document["cross_validation"]
     rows = block["points"]
     failed = [fold for fold in block["folds"] if fold["reason"]]
     chance = "" if block["p"] is None else f" Probability of larger errors by chance: {100 * block['p']:.1f} %."
-    text = (
+    yield Words(
         f"The same adjustment without some of the control, {counted(len(block['folds']) - len(failed), 'time')}: "
         f"adjusted minus given at the points that it did not see.{chance}"
     )
-    parts: list[Part] = [Words(text)]
-    parts += [
-        Words(f"not without {listed(fold['left_out'], IDS_NAMED)}: {fold['reason']}", "look", "-")
-        for fold in failed[:FAILED_SHOWN]
-    ]
+    for fold in failed[:FAILED_SHOWN]:
+        yield Words(f"not without {listed(fold['left_out'], IDS_NAMED)}: {fold['reason']}", "look", "-")
     if len(rows):
         where = ("points", "cross-validation", "cross_validation")
-        shown, note = worst_first(rows, [-_chance(row) for row in rows], where, everything=everything, most=most)
+        shown, note = worst_first(rows, [-_chance(row) for row in rows], where, most)
         seen = {f"z_{part}": (block[part]["ratio"], block[part]) for part in PARTS}
-        explained = not everything and document["summary"]["check"]["plan"]["count"]  # above, at the check points
+        explained = most is not None and document["summary"]["check"]["plan"]["count"]  # above, at the check points
         below = note if explained else note_of(note, MEANING)
-        parts.append(_unseen(document, rows, shown, seen, "fold:2", below, rows.quantities))
-    return Section("Cross-validation", tuple(parts))
+        yield _unseen(document, rows, shown, seen, "fold:2", below, rows.quantities)
 
 
 def _chance(row: Document) -> float:
@@ -223,66 +214,64 @@ def _rms(values: Sequence[float]) -> float | None:
     return (sum(value * value for value in values) / len(values)) ** 0.5 if values else None
 
 
-def weights_section(document: Document, *, everything: bool) -> Section:
-    """Return the standard deviation of every control coordinate as stated and as it counted in the fit."""
-    control = _given(document, "control")
-    shown = control if everything else control[:ALL_SHOWN]
-    if not len(shown):
-        return Section("Weights of the control", (Words("No control point was measured."),))
-    rest = len(control) - len(shown)
-    note = note_of(
-        elsewhere(rest, "points", "weights", "control") if rest else "",
-        "σ: as given, then in the fit, combined with that of a model point; the weight of a coordinate is 1 / σ²",
-        "columns in the order of the axes of each list" if len(set(control.values("list"))) > 1 else "",
-    )
+def weights(document: Document) -> Iterator[Part]:
+    """Give the standard deviation of every control coordinate as stated and as it counted in the fit."""
+    if "bundle" in document:
+        return
+    given = _given(document, "control")
+    if not len(given):
+        yield Words("No control point was measured.")
+        return
     letters = {f"_{n}": "z" if axis in {"up", "z"} else "x" for n, axis in enumerate(document["frame"]["axes"], 1)}
     rows = [  # what does not count weighs nothing
-        {key: None if letters.get(key[-2:], "") not in row["use"] else value for key, value in row.items()}
-        for row in shown
+        row | {key: None for key in row if letters.get(key[-2:], "") not in row["use"]} for row in given
     ]
-    keys = "id use sigma_1:1 sigma_2:1 sigma_3:1 sigma_fit_* list:2"
-    return Section("Weights of the control", (keyed(rows, keys, note, quantities=control.quantities),))
+    note = note_of(
+        "σ: as given, then in the fit, combined with that of a model point; the weight of a coordinate is 1 / σ²",
+        "columns in the order of the axes of each list" if len(set(given.values("list"))) > 1 else "",
+    )
+    yield keyed(rows, "id use sigma_1:1 sigma_2:1 sigma_3:1 sigma_fit_* list:2", note, quantities=given.quantities)
 
 
-def ties_section(document: Document, *, everything: bool) -> Section:
-    """Differences of points that two strips share."""
-    ties = document["ties"]
-    if not len(ties):
-        return Section("Ties between strips", (Words("The strips have no points in common."),))
-    sizes = [max(row["plan_um"], abs(row["height_um"])) for row in ties]
-    shown, note = worst_first(ties, sizes, ("points", "ties", "ties"), everything=everything)
-    foot = {key: metres(_rms(ties.values(key))) for key in DIFFERENCES}
-    foot |= {key: micrometres(_rms(ties.values(key))) for key in ("plan_um", "height_um")}
-    below = note_of(note, "second strip minus first; the result is their mean")
-    table = keyed(shown, "id strips dx dy dz plan_um height_um", below, foot=[{"id": "rms", **foot}])
-    return Section("Ties between strips", (table,))
+def ties(document: Document) -> Iterator[Part]:
+    """Give differences of points that two strips share."""
+    if document["counts"]["strips"] < 2 or "bundle" in document:
+        return
+    rows = document["ties"]
+    if not len(rows):
+        yield Words("The strips have no points in common.")
+        return
+    foot = {key: metres(_rms(rows.values(key))) for key in DIFFERENCES}
+    foot |= {key: micrometres(_rms(rows.values(key))) for key in ("plan_um", "height_um")}
+    note = "second strip minus first; the result is their mean"
+    yield keyed(rows, "id strips dx dy dz plan_um height_um", note, foot=[{"id": "rms", **foot}])
 
 
-def image_section(document: Document) -> Section:
-    """Photos and points with the largest image residuals under the final orientations."""
+def images(document: Document) -> Iterator[Part]:
+    """Give photos and points with the largest image residuals under the final orientations."""
+    if "links" in document:
+        return
     text = (
         "Photos and points come from one adjustment. "
         if "bundle" in document
         else "Every photo is oriented again on its adjusted points, so that orientations and points agree. "
     )
-    text += f"rms of the image residuals {micrometres(document['summary']['image_rms_um'])} µm."
+    yield Words(f"{text}rms of the image residuals {micrometres(document['summary']['image_rms_um'])} µm.")
     rays = Counter(column_of(document["points"], "rays"))
-    facts = Facts((("points by photos", ", ".join(f"{rays[n]} on {counted(n, 'photo')}" for n in sorted(rays))),))
-    photos, points = (
-        keyed(taken(rows, largest_of(rows, "image_rms_um", WORST_POINTS)), keys, f"the worst {what}")
-        for rows, keys, what in (
-            (document["photos"], "id image_rms_um points strip:1 *:2", "photos"),
-            (document["points"], "id image_rms_um rays role:1 *:2", "points"),
-        )
-    )
-    return Section("Image residuals", (Words(text), facts, photos, points))
+    yield Facts((("points by photos", ", ".join(f"{rays[n]} on {counted(n, 'photo')}" for n in sorted(rays))),))
+    columns = {"photos": "id image_rms_um points strip:1 *:2", "points": "id image_rms_um rays role:1 *:2"}
+    for block, keys in columns.items():
+        rows = document[block]
+        yield keyed(taken(rows, largest_of(rows, "image_rms_um", WORST_POINTS)), keys, f"the worst {block}")
 
 
-def precision_section(document: Document, *, everything: bool) -> Section:
-    """Show standard deviations carried from the image coordinates and the control to points and photos."""
+def precision(document: Document) -> Iterator[Part]:
+    """Give standard deviations carried from the image coordinates and the control to points and photos."""
+    if "precision" not in document:
+        return
     block = document["precision"]
     measured = "model" if "links" in document else "image"
-    text = (
+    yield Words(
         f"Standard deviations propagated from the {measured} coordinates and the control through every step of the "
         "adjustment. They cover random errors: what a lens, the film or refraction does to a whole strip is "
         "not included."
@@ -292,10 +281,12 @@ def precision_section(document: Document, *, everything: bool) -> Section:
     if len(basis) > 1:
         sigmas = [f"strip {each['strip']} {sigma}" for each, sigma in zip(basis, sigmas, strict=True)]
     facts = [(f"{measured} coordinates", ", ".join(sigmas)), *precision_lines(block, "points, {}")]
-    facts += _check(block.get("check"))
-    parts: list[Part] = [Words(text), Facts(tuple(facts)), _least_precise(document["points"])]
-    parts += [_along(document, block["along"], everything=everything)] if len(block["along"]) else []
-    return Section("Precision", tuple(parts))
+    yield Facts((*facts, *_check(block.get("check"))))
+    yield _least_precise(document["points"])
+    if len(block["along"]):
+        keys = "photo distance points plan height centre_plan:1 centre_height:1"
+        note = "rms of the points nearest to each photo, and its perspective centre"
+        yield keyed(block["along"], f"{keys} strip:2" if len(document["strips"]) > 1 else keys, note)
 
 
 def precision_lines(block: Document, label: str) -> Iterator[tuple[str, str]]:
@@ -329,32 +320,20 @@ def _least_precise(points: Any) -> Table:  # noqa: ANN401 (a table of a result)
     return keyed(taken(points, [*places, *by_height[: WORST_POINTS - len(places)]]), keys, note)
 
 
-def _along(document: Document, rows: Any, *, everything: bool) -> Table:  # noqa: ANN401 (a table of a result)
-    note, left_out = "rms of the points nearest to each photo, and its perspective centre", 0
-    if not everything and len(rows) > ALL_SHOWN:
-        step, left_out = (len(rows) - 1) / (STATIONS_SHOWN - 1), len(rows) - STATIONS_SHOWN
-        rows = rows[[round(number * step) for number in range(STATIONS_SHOWN)]]
-    more = elsewhere(left_out, "photos", "precision", "precision") if left_out else ""
-    keys = "photo distance points plan height centre_plan:1 centre_height:1"
-    return keyed(rows, f"{keys} strip:2" if len(document["strips"]) > 1 else keys, note_of(note, more))
-
-
-def marks_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
-    """Show what is left at marks of given points on each photo, in pixels where its camera has some.
-
-    The section has no parts where no given point has a residual on a photo.
-    """
+def marks(document: Document, most: int | None = None) -> Iterator[Part]:
+    """Give what is left at marks of given points on each photo, in pixels where its camera has some."""
     place = {name: number for number, name in enumerate(document["control"].values("id"))}
-    marks = sorted(_marks(document), key=lambda mark: place[mark["point"]])
-    text = "Measured minus computed from the adjusted coordinates: what shows here is a mark beside its point."
-    parts: list[Part] = [Words(text)] if marks else []
+    rows = sorted(_marks(document), key=lambda mark: place[mark["point"]])
+    if rows:
+        text = "Measured minus computed from the adjusted coordinates: what shows here is a mark beside its point."
+        yield Words(text)
     for unit, decimals in (("px", 2), ("µm", 1)):
-        own = [mark for mark in marks if mark["unit"] == unit]
+        own = [mark for mark in rows if mark["unit"] == unit]
         if not own:
             continue
-        parts.append(Facts(tuple(_summed(own, f"{unit} {decimals}"))))
+        yield Facts(tuple(_summed(own, f"{unit} {decimals}")))
         lengths = [mark["length"] for mark in own]
-        shown, note = worst_first(own, lengths, ("marks", "marks", "residuals"), everything=everything, most=most)
+        shown, note = worst_first(own, lengths, ("marks", "marks", "residuals"), most)
         if len(shown) > MOST_MARKS:
             shown = nlargest(MOST_MARKS, own, key=itemgetter("length"))
             note = f"the worst {MOST_MARKS} of {len(own)}; `residuals` in result.json has all"
@@ -365,10 +344,8 @@ def marks_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
             Field("test", " 2", shown=tested),
             Field("state", head=""),
         )
-        rows = ([mark[column.key] for column in columns] for mark in shown)
         below = note_of(note, "test: the larger of both over its standard deviation" if tested else "")
-        parts.append(tabulated(columns, rows, below))
-    return Section("Marks of given points", tuple(parts))
+        yield tabulated(columns, ([mark[column.key] for column in columns] for mark in shown), below)
 
 
 def _marks(document: Document) -> Iterator[Document]:
@@ -407,13 +384,10 @@ def _summed(marks: Sequence[Document], form: str) -> Iterator[tuple[str, str]]:
             yield role, f"{counted(len(own), 'mark')}, rms {with_unit(rms, form)}; largest {largest}"
 
 
-def rejected_section(document: Document, *, everything: bool) -> Section:
-    rejected = standing_rejections(document)
-    if not len(rejected):
-        return Section("Rejected", (Words("Nothing was rejected."),))
-    where = ("rejections", "rejected", "rejected")
-    shown, note = worst_first(rejected, "parallax_um", where, everything=everything)
-    return Section("Rejected", (keyed(shown, "point photo+other_photo test value limit unit reason:1", note),))
+def rejected(document: Document) -> Iterator[Part]:
+    rows = standing_rejections(document)
+    keys = "point photo+other_photo test value limit unit reason:1"
+    yield keyed(rows, keys) if len(rows) else Words("Nothing was rejected.")
 
 
 def standing_rejections(document: Document) -> Any:  # noqa: ANN401 (a table of a result)
@@ -421,13 +395,12 @@ def standing_rejections(document: Document) -> Any:  # noqa: ANN401 (a table of 
     return document["rejected"].where(readmitted=False)
 
 
-def not_determined_section(document: Document, *, everything: bool) -> Section:
-    """Points that have no coordinates, by reason."""
-    parts: list[Part] = []
+def not_determined(document: Document) -> Iterator[Part]:
+    """Name points that have no coordinates, by reason."""
     for reason, names in missing_points(document):
-        named = listed(names, len(names) if everything else IDS_NAMED)
-        parts.append(Words(f"{counted(len(names), 'point')} ({reason}): {named}", mark="-"))
-    return Section("Points without coordinates", tuple(parts) or (Words("None."),))
+        yield Words(f"{counted(len(names), 'point')} ({reason}): {listed(names, len(names))}", mark="-")
+    if not len(document["not_determined"]):
+        yield Words("None.")
 
 
 def missing_points(document: Document) -> list[tuple[str, list[str]]]:
@@ -435,16 +408,11 @@ def missing_points(document: Document) -> list[tuple[str, list[str]]]:
     return [(reason, [row["id"] for row in group]) for reason, group in groupby(missing, key=itemgetter("reason"))]
 
 
-def notes_section(document: Document, *, everything: bool) -> Section:
-    notes = list(document["notes"])
-    limit = len(notes) if everything else 2 * WORST_SHOWN
-    parts: list[Part] = [
-        Words(f"{note['severity']}: {sentence_of(note)}", "look" if note["severity"] == "warning" else "", "-")
-        for note in notes[:limit]
-    ]
-    if len(notes) > limit:
-        parts.append(Words(elsewhere(len(notes) - limit, "notes", "notes", "notes")))
-    return Section("Notes", tuple(parts) or (Words("None."),))
+def notes(document: Document) -> Iterator[Part]:
+    for each in document["notes"]:
+        yield Words(f"{each['severity']}: {sentence_of(each)}", "look" if each["severity"] == "warning" else "", "-")
+    if not len(document["notes"]):
+        yield Words("None.")
 
 
 def sentence_of(note: Document) -> str:

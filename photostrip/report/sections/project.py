@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.parts import DASH, Facts, Section, Words
+from photostrip.report.page.parts import DASH, Facts, Part, Words
 from photostrip.report.page.tables import (
     LEAST_PROBABILITY,
     angle_unit,
@@ -28,7 +28,7 @@ def scale_word(document: Document) -> str:
     return "model" if of_models(document) else "photo"
 
 
-def project_section(document: Document) -> Section:
+def project(document: Document) -> Iterator[Part]:
     meaning, settings = document["conventions"], document["settings"]
     scale, models = scale_word(document), of_models(document)
     rows = [
@@ -45,7 +45,7 @@ def project_section(document: Document) -> Section:
         rows.append(("links", "a similarity in space from model to model"))
     else:
         rows.append(("scale transfer", settings["formation"]["scale_transfer"].replace("_", " ")))
-    return Section("Project", (Facts(tuple(rows)),))
+    yield Facts(tuple(rows))
 
 
 def adjustment_of(document: Document) -> str:
@@ -124,11 +124,12 @@ def _of_links(settings: Document) -> str:
     return "; ".join([text, *named])
 
 
-def counts_section(document: Document) -> Section:
-    facts, strips = Facts(tuple(counts_rows(document))), document["strips"]
-    scale = "model_scale" if of_models(document) else "photo_scale"
-    keys = f"id photos points {scale} flying_height base azimuth_deg sigma0_um image_rms_um:1"
-    return Section("Counts", (facts, keyed(strips, keys)) if len(strips) > 1 else (facts,))
+def counts(document: Document) -> Iterator[Part]:
+    yield Facts(tuple(counts_rows(document)))
+    if len(document["strips"]) > 1:
+        scale = "model_scale" if of_models(document) else "photo_scale"
+        keys = f"id photos points {scale} flying_height base azimuth_deg sigma0_um image_rms_um:1"
+        yield keyed(document["strips"], keys)
 
 
 def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
@@ -169,11 +170,10 @@ def _rejections(counts: Document) -> str:
     return f"{text}, {counted(points, 'point')} with rays that contradict each other" if points else text
 
 
-def decisions_section(document: Document) -> Section:
+def decisions(document: Document) -> Iterator[Part]:
     """Say what `auto` came to, and why."""
     rows = tuple(_decisions(document))
-    parts = (Facts(rows),) if rows else (Words("Nothing: every choice is made in the project file."),)
-    return Section("Decided automatically", parts)
+    yield Facts(rows) if rows else Words("Nothing: every choice is made in the project file.")
 
 
 def _decisions(document: Document) -> Iterator[tuple[str, str]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from photostrip.notes import Document, listed
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import Field, metres, signed, tabulated
@@ -24,19 +26,20 @@ NAMES = {"photostrip": "photostrip", "python": "Python", "numpy": "numpy", "scip
 OF_FRAMES = {"proj": "PROJ", "epsg": "EPSG data set"}
 
 
-def statement_section(document: Document) -> Section:
+def statement(document: Document) -> Iterator[Part]:
+    if "statement" not in document:
+        return
     block = document["statement"]
     if block["status"] == "refused":
-        parts: list[Part] = [Words("No accuracy can be stated by a norm:")]
+        yield Words("No accuracy can be stated by a norm:")
         for each in block["reasons"]:
             points = f": {listed(each['points'])}" if each["points"] else ""
-            parts.append(Words(f"{each['message']}{points}; {each['fix']}", mark="-"))
-        return Section("Accuracy statement", tuple(parts))
-    parts = [Words(text, mark="-") for text in block["sentences"]]
-    parts.append(_accuracies(block))
-    parts += [Words(text, mark="-") for text in block["remarks"]]
-    parts.append(Words("photostrip statement writes it with the measures of ISO 19157, to be signed."))
-    return Section("Accuracy statement", tuple(parts))
+            yield Words(f"{each['message']}{points}; {each['fix']}", mark="-")
+        return
+    yield from (Words(text, mark="-") for text in block["sentences"])
+    yield _accuracies(block)
+    yield from (Words(text, mark="-") for text in block["remarks"])
+    yield Words("photostrip statement writes it with the measures of ISO 19157, to be signed.")
 
 
 def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, tuple[Section, ...]]:
@@ -124,19 +127,22 @@ def _check_points(document: Document) -> Table:
     return tabulated(columns, rows, "adjusted minus given")
 
 
-def certificate_section(document: Document) -> Section:
+def certificate(document: Document) -> Iterator[Part]:
+    if "certificate" not in document:
+        return
     block = document["certificate"]
-    found = block["versions"]
+    versions = block["versions"]
+    frames = ", ".join(f"{OF_FRAMES[name]} {versions[name]}" for name in OF_FRAMES if versions[name])
     epochs = list(dict.fromkeys(f"{epoch:.3f}" for epoch in block["epochs"] if epoch is not None))
-    facts = Facts(
+    yield Facts(
         (
             ("Result", block["result_sha256"]),
             ("Project with all defaults", block["resolved_sha256"]),
             ("Overridden", "; ".join(block["set"]) or "nothing"),
             ("Epochs", ", ".join(epochs) or "none given"),
-            ("Computed by", ", ".join(f"{NAMES[name]} {found[name]}" for name in NAMES)),
-            ("Frames by", ", ".join(f"{OF_FRAMES[name]} {found[name]}" for name in OF_FRAMES if found[name]) or DASH),
+            ("Computed by", ", ".join(f"{NAMES[name]} {versions[name]}" for name in NAMES)),
+            ("Frames by", frames or DASH),
         )
     )
     files = [(row["file"], row["sha256"]) for rows in (block["inputs"], block["grids"]) for row in rows]
-    return Section("Certificate", (facts, tabulated((Field("file"), Field("SHA-256")), files)))
+    yield tabulated((Field("file"), Field("SHA-256")), files)

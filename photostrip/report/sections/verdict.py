@@ -8,7 +8,7 @@ from operator import itemgetter
 
 from photostrip.notes import LOST_SAY, Document, before, counted
 from photostrip.report.page.messages import MOST_OF_A_KIND
-from photostrip.report.page.parts import Part, Section, Words
+from photostrip.report.page.parts import Part, Words
 from photostrip.report.page.tables import elsewhere, keyed
 
 HEADLINES = {
@@ -17,7 +17,6 @@ HEADLINES = {
     "look": "LOOK at {number} before you use this.",
     "failed": "FAILED: {failed}.",
 }
-LOOK_SHOWN = 10
 MOST_NAMED = 8  # by one thing to look at: a page leads to their rows
 
 
@@ -44,22 +43,23 @@ def accuracy(document: Document) -> Words:
     return Words(" ".join(f"{text[0].upper()}{text[1:]}." for text in texts))
 
 
-def verdict_section(document: Document, *, everything: bool = False, most: int = LOOK_SHOWN) -> Section:
-    """Whether the result can be used, and what to look at: what was given and lost its say always."""
+def verdict(document: Document, most: int | None = None) -> Iterator[Part]:
+    """Say whether the result can be used, and what to look at: what was given and lost its say always."""
     look_at = document["verdict"]["look_at"]
     lost = _lost(document)
     shown = [
         (number, text)
         for number, text in enumerate(look_at, 1)
-        if everything or number <= most or any(message in text for message in lost)
+        if most is None or number <= most or any(message in text for message in lost)
     ]
-    parts: list[Part] = [Words(headline(document), document["status"]), accuracy(document)]
-    parts += [Words(text, mark=f"{number}.", names=_named(document, text)) for number, text in shown]
+    yield Words(headline(document), document["status"])
+    yield accuracy(document)
+    for number, text in shown:
+        yield Words(text, mark=f"{number}.", names=_named(document, text))
     if len(look_at) > len(shown):
-        parts.append(Words(elsewhere(len(look_at) - len(shown), "things", "verdict", "verdict")))
+        yield Words(elsewhere(len(look_at) - len(shown), "things", "verdict", "verdict"))
     if len(document["tolerances"]):
-        parts.append(keyed(document["tolerances"], "name value limit unit passed"))
-    return Section("Verdict", tuple(parts))
+        yield keyed(document["tolerances"], "name value limit unit passed")
 
 
 def _lost(document: Document) -> list[str]:
@@ -81,32 +81,28 @@ def names_of(said: Document) -> tuple[tuple[str, str], ...]:
     return tuple((kind, name) for kind in ("point", "photo") for name in said.get(f"{kind}s") or ())
 
 
-def findings_sections(document: Document, *, everything: bool) -> tuple[Section, ...]:
-    """Return the section of the findings: each with its numbers and its cure; none when there are none."""
-    findings = document.get("findings", [])
-    if not len(findings):
-        return ()
-    parts: list[Part] = []
-    for _, group in groupby(findings, key=itemgetter("code")):
-        kind = list(group)
-        shown = kind if everything else kind[:MOST_OF_A_KIND]
-        parts += [part for each in shown for part in _paragraphs(each)]
-        if len(kind) > len(shown):
-            text = f"{_title(kind[0])}: {len(kind) - len(shown)} more in `findings` of result.json."
-            parts.append(Words(text, _colour(kind[0]), "-"))
-    return (Section("Plausibility of the data", tuple(parts)),)
+def findings(document: Document) -> Iterator[Part]:
+    """Give each finding with its numbers and its cure."""
+    for each in document.get("findings", ()):
+        place = before(each["file"], each["line"], each["column"])
+        text = f"{_title(each)} ({_word(each)}): {place}{each['message']}."
+        yield Words(text, _colour(each), mark="-", names=names_of(each))
+        if each["evidence"]:
+            numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in each["evidence"].items())
+            yield Words(f"Evidence: {numbers}.", "", " ")
+        if _cure(each):
+            yield Words(_cure(each), "", " ")
 
 
-def cures_section(document: Document, most: int) -> Section:
+def cures(document: Document, most: int) -> Iterator[Part]:
     """Say what would put the findings right, and which of them are accepted; what they say stands in the verdict."""
-    findings = list(document.get("findings", []))
-    kinds = len({each["code"] for each in findings})
-    of_a_kind = min(max(most // max(kinds, 1), 1), MOST_OF_A_KIND)
-    shown = [each for _, kind in groupby(findings, key=itemgetter("code")) for each in islice(kind, of_a_kind)][:most]
-    parts = [Words(f"{_title(each)} ({_word(each)}). {_cure(each)}".strip(), _colour(each), "-") for each in shown]
-    if len(findings) > len(shown):
-        parts.append(Words(elsewhere(len(findings) - len(shown), "findings", "findings", "findings")))
-    return Section("Plausibility of the data", tuple(parts))
+    rows = list(document.get("findings", []))
+    of_a_kind = min(max(most // max(len({each["code"] for each in rows}), 1), 1), MOST_OF_A_KIND)
+    shown = [each for _, kind in groupby(rows, key=itemgetter("code")) for each in islice(kind, of_a_kind)][:most]
+    for each in shown:
+        yield Words(f"{_title(each)} ({_word(each)}). {_cure(each)}".strip(), _colour(each), "-")
+    if len(rows) > len(shown):
+        yield Words(elsewhere(len(rows) - len(shown), "findings", "findings", "findings"))
 
 
 def _title(finding: Document) -> str:
@@ -125,14 +121,3 @@ def _cure(finding: Document) -> str:
     """Return what would put a finding right; nothing for one that is accepted."""
     cure = "" if finding["accepted"] else str(finding["fix"])
     return cure and f"To put it right: {cure}{'' if cure.endswith('?') else '.'}"
-
-
-def _paragraphs(finding: Document) -> Iterator[Part]:
-    place = before(finding["file"], finding["line"], finding["column"])
-    text = f"{_title(finding)} ({_word(finding)}): {place}{finding['message']}."
-    yield Words(text, _colour(finding), mark="-", names=names_of(finding))
-    if finding["evidence"]:
-        numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in finding["evidence"].items())
-        yield Words(f"Evidence: {numbers}.", "", " ")
-    if _cure(finding):
-        yield Words(_cure(finding), "", " ")

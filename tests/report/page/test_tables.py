@@ -102,7 +102,7 @@ def document(unit: str, adjustment: str = "polynomial") -> Document:
 
 
 def tables(found: Document) -> list[Table]:
-    return [part for each in sections_of(found, everything=True) for part in each.parts if isinstance(part, Table)]
+    return [part for each in sections_of(found) for part in each.parts if isinstance(part, Table)]
 
 
 @pytest.mark.slow
