@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
+
+import numpy as np
+
 from photostrip.arrays import Floats
 from photostrip.errors import InputError
 from photostrip.formats.measured.columns import POINT, numbers
@@ -9,7 +13,7 @@ from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.observations import read_measurements
 from photostrip.formats.measured.terrestrial import read_points
 from photostrip.formats.text.findings import Findings
-from photostrip.formats.text.tables import Column
+from photostrip.formats.text.tables import Column, Table
 
 IMAGE, XYZ, GROUND = ("x", "y"), ("x", "y", "z"), ("x_ground", "y_ground", "z_ground")
 PHOTOS = (("x_left", "y_left"), ("x_right", "y_right"))
@@ -24,19 +28,35 @@ COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "polynomial": (XYZ, ("misclosure",)),
     "resection": (IMAGE, GROUND),
     "bundle": (GROUND,),  # of its control
+    "frame": (("longitude", "latitude", "height"),),
+    "curvature": (XYZ,),
+    "pair-scales": (XYZ, GROUND),
+    "closed-form": (IMAGE,),
+    "deformation": (IMAGE, ("dz",)),
 }
+WEIGHTED = ("scale", "absolute")  # may have the column ``weight``
+WEIGHT = Column("weight", number=True, required=False, filled=False, positive=True)
 MARK = Column("point", aliases=("mark", "photo", *POINT.aliases))
 
 
-def read_step(file: str, step: str) -> tuple[list[str], list[Floats]]:
-    """Read the table of a step: ids, and its coordinates by system; or raise every fault of it."""
+def read_step(file: str, step: str, systems: tuple[tuple[str, ...], ...] = ()) -> tuple[list[str], list[Floats]]:
+    """Read the table of a step: ids, its coordinates by system, weights where it may have them, or raise its faults.
+
+    systems: its columns, where they are not the usual ones.
+    """
     findings = Findings()
-    systems = COLUMNS[step]
-    table = read_points(file, (MARK, *(each for names in systems for each in numbers(*names))), findings)
+    wanted, weights = systems or COLUMNS[step], (WEIGHT,) if step in WEIGHTED else ()
+    table = read_points(file, (MARK, *(each for names in wanted for each in numbers(*names)), *weights), findings)
     findings.stop()
     if table is None:  # cannot be: what is not read has a fault, and stop() raised it
         raise InputError(f"{file} cannot be read")
-    return table.cells("point"), [table.columns(*names) for names in systems]
+    return table.cells("point"), [*(table.columns(*names) for names in wanted), *map(partial(_weights, table), weights)]
+
+
+def _weights(table: Table, column: Column) -> Floats:
+    """Return the weights of the points: those of empty cells, and of a table without any, are 1."""
+    given = table.numbers.get(column.name)
+    return np.ones(len(table.lines)) if given is None else np.where(np.isnan(given), 1.0, given)
 
 
 def read_rays(file: str) -> Measurements:
