@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -61,10 +62,6 @@ class Fact:
 def hidden(*keys: str, form: str = "") -> tuple[Field, ...]:
     """Return columns that stand in JSON and CSV alone."""
     return tuple(Field(key, form, shown=False) for key in keys)
-
-
-def _parts(said: Sequence[str | Part]) -> tuple[Part, ...]:
-    return tuple(Words(each) if isinstance(each, str) else each for each in said)
 
 
 @dataclass(frozen=True)
@@ -190,6 +187,12 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
         case "md":
             return to_markdown(title, sections)
     return to_text(title, sections, width or USUAL)
+
+
+def listed(key: str, title: str, columns: Sequence[Field], objects: Iterable[Any], **more: Any) -> Rows:  # noqa: ANN401 (of rows)
+    """Return a table with a row for each object, in which each column knows what stands in it."""
+    values = [attrgetter(each.of or each.key) if isinstance(each.of, str) else each.of for each in columns]
+    return Rows(key, title, columns, [[value(each) for value in values] for each in objects], **more)
 
 
 def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:

@@ -6,7 +6,7 @@ digits, ``"mm² e4"`` as a power, `` %1`` as percent; ``"ratio 2"`` has no unit;
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import nlargest
 from math import isfinite
@@ -129,6 +129,7 @@ class Field:
     below: str | None = None  # second line of the head; None: the unit
     rank: int = 0
     shown: bool = True
+    of: str | Callable[[Any], Any] = ""  # what of an object stands in it, in a sheet; empty: what the key names
 
     @property
     def name(self) -> str:
