@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import json
+import shlex
+import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from photostrip.cli.failures import failures_as
 from photostrip.cli.options import Assigned, Printed, Rule, Silent, Written
 from photostrip.cli.output import Messages, check_target, deliver, write_rule
+from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, PhotostripError
 from photostrip.planning import PlanKind
 from photostrip.strip import StepName
 from photostrip.terrestrial import TerrestrialKind
+
+if TYPE_CHECKING:
+    from photostrip.notes import Document
+    from photostrip.sheets.sources import Place, Shown
 
 Keys = Annotated[
     Path | None,
@@ -121,12 +132,61 @@ def step(
         deliver(computed(name, str(file), assignments or [], trace=trace), form, output, quiet=quiet)
 
 
-def sources(form: Printed = "text") -> None:
-    """Compute every worked number of the sources again.
+def sources(
+    place: Annotated[
+        str | None,
+        typer.Argument(metavar="PLACE", help="Do what stands there, as '001 eq. 138'.", show_default=False),
+    ] = None,
+    form: Printed = "text",
+    inputs: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Write what the commands of the sources read."),
+    ] = None,
+) -> int:
+    """Compute every worked number of the sources again; with a place, run what shows it.
 
-    Lists every misprint, and the command and the function for every equation.
+    Lists every misprint, every conclusion with whether it holds, and for every equation its number, command and
+    function. Exit code 1: a number is not the one that is known.
     """
     with failures_as(form):
-        from photostrip.sheets.sources import sources_sheet
+        from photostrip.sheets.sources import found_places, places_sheet, sources_sheet, write_inputs
 
-        deliver(sources_sheet(), form)
+        if inputs is not None:
+            write_inputs(inputs)
+        if place is None:
+            if inputs is None:
+                deliver(sources_sheet(), form)
+            return 0
+        shown = _shown(found_places(place), write_inputs)
+        deliver(places_sheet(shown), form)
+        return 0 if all(each.agrees for each in shown) else 1
+
+
+def _shown(places: Sequence[Place], write_inputs: Callable[[Path], None]) -> list[Shown]:
+    """Run the commands of places in a folder with what they read, and look up what each prints."""
+    from photostrip.sheets.sources import Shown, quantity_of
+
+    documents: dict[str, Document] = {}
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        write_inputs(Path())
+        for command in dict.fromkeys(each.command for each in places):
+            documents[command] = document_of(command)
+    return [Shown(each, quantity_of(documents[each.command], each.quantity)) for each in places]
+
+
+def document_of(command: str) -> Document:
+    """Run commands with && between; return what the last one prints, or the trace that it writes, as JSON."""
+    from photostrip.cli.main import main
+
+    *before, last = (shlex.split(each)[1:] for each in command.split("&&"))
+    trace = next((each for each in last if each.endswith(".txt")), None)
+    wanted = [*last, "--format", "json"] if trace is None else [each.replace(".txt", ".json") for each in last]
+    printed = io.StringIO()
+    for each in (*before, wanted):
+        with contextlib.redirect_stdout(printed):
+            code = main(each)
+        if code not in (EXIT_DONE, EXIT_TOLERANCE):
+            raise PhotostripError(f"`photostrip {shlex.join(each)}` ended with {code}")
+    text = printed.getvalue() if trace is None else Path(trace).with_suffix(".json").read_text(encoding="utf-8")
+    document: Document = json.loads(text)
+    return document
