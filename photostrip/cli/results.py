@@ -169,9 +169,8 @@ def compare(
     """
     from photostrip.formats.output.result_json import text_of
     from photostrip.formats.output.result_lines import line_finder
-    from photostrip.library.again import compare_again
     from photostrip.library.comparison import compare as compared
-    from photostrip.library.comparison import results_below
+    from photostrip.library.comparison import compare_again, results_below
     from photostrip.project.tolerances import load_tolerances
     from photostrip.report.commands.compare_findings import compare_cases, compare_findings
     from photostrip.report.commands.comparisons import TRUTH, comparison_report

@@ -49,7 +49,7 @@ def plan(
     with gross errors in pairs, or one of your own. `photostrip schema --plan KIND` lists the keys.
     """
     with failures_as(form):
-        from photostrip.library.plan import planned
+        from photostrip.library.sheets import planned
         from photostrip.report.pictures.plan_strip import strip_plan_picture
 
         check_target(output, depfile, picture=kind == "strip")
@@ -77,7 +77,7 @@ def terrestrial(
     one, with known distances. cameras: those that can be named. `photostrip schema --terrestrial KIND` lists the keys.
     """
     with failures_as(form):
-        from photostrip.library.terrestrial import terrestrial as computed
+        from photostrip.library.sheets import terrestrial as computed
         from photostrip.report.pictures.displacements import displacement_picture
 
         moved = kind == "displacement"

@@ -48,24 +48,6 @@ MILLION = 1e6
 TRACE = "trace_"  # before the keys of tables of a trace
 DIGITS = 10  # of values: more than any measurement has
 TEXTBOOK = "alpha-omega-kappa"  # system of the angles of [001]
-TITLES = {
-    "interior": "Interior orientation",
-    "refine": "Refined image coordinates",
-    "relative": "Relative orientation",
-    "intersection": "Space intersection",
-    "chain": "Orientation handed on along a strip",
-    "scale": "Scale transfer",
-    "strip": "Strip in model coordinates",
-    "absolute": "Absolute orientation",
-    "polynomial": "Polynomial",
-    "resection": "Space resection",
-    "bundle": "Bundle adjustment",
-    "frame": "Intermediate frame",
-    "curvature": "Earth curvature",
-    "pair-scales": "Scales of pairs of points",
-    "closed-form": "Errors of points in closed form",
-    "deformation": "Deformation of a model",
-}
 
 _COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
 _EXCHANGED = str.maketrans("XxYy", "YyXx")  # where the base lies along Y
@@ -74,11 +56,11 @@ _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
 
 def step(name: StepName, file: str, assignments: Sequence[str], *, trace: bool = False) -> Sheet:
     """Compute a step from its table, with the equations and their numbers if a trace is wanted."""
-    kind, computed = _STEPS[name]
+    title, kind, computed = _STEPS[name]
     given: Any = read_keys(kind, None, assignments)[0]
     sheet = computed(file, given)
     shown = [each for each in sheet.tables if trace or not each.key.startswith(TRACE)]
-    return replace(sheet, title=TITLES[name], tables=shown)
+    return replace(sheet, title=title, tables=shown)
 
 
 def _interior(file: str, given: keys.InteriorKeys) -> Sheet:
@@ -419,23 +401,23 @@ def _deformation(file: str, given: keys.DeformationKeys) -> Sheet:
     return _sheet("deformation", values, ids, listed, _equations(words))
 
 
-_STEPS: dict[StepName, tuple[type[Section], Callable[[str, Any], Sheet]]] = {
-    "interior": (keys.InteriorKeys, _interior),
-    "refine": (keys.RefineKeys, _refine),
-    "relative": (keys.RelativeKeys, _relative),
-    "intersection": (keys.IntersectionKeys, _intersection),
-    "chain": (keys.TurnedKeys, _chain),
-    "scale": (keys.StepKeys, _scale),
-    "strip": (keys.StripKeys, _strip),
-    "absolute": (keys.AbsoluteKeys, _absolute),
-    "polynomial": (keys.PolynomialKeys, _polynomial),
-    "resection": (keys.ResectionKeys, _resection),
-    "bundle": (keys.BundleKeys, _bundle),
-    "frame": (keys.FrameKeys, _frame),
-    "curvature": (keys.CurvatureKeys, _curvature),
-    "pair-scales": (keys.PairScalesKeys, _pair_scales),
-    "closed-form": (keys.ClosedFormKeys, _closed_form),
-    "deformation": (keys.DeformationKeys, _deformation),
+_STEPS: dict[StepName, tuple[str, type[Section], Callable[[str, Any], Sheet]]] = {
+    "interior": ("Interior orientation", keys.InteriorKeys, _interior),
+    "refine": ("Refined image coordinates", keys.RefineKeys, _refine),
+    "relative": ("Relative orientation", keys.RelativeKeys, _relative),
+    "intersection": ("Space intersection", keys.IntersectionKeys, _intersection),
+    "chain": ("Orientation handed on along a strip", keys.TurnedKeys, _chain),
+    "scale": ("Scale transfer", keys.StepKeys, _scale),
+    "strip": ("Strip in model coordinates", keys.StripKeys, _strip),
+    "absolute": ("Absolute orientation", keys.AbsoluteKeys, _absolute),
+    "polynomial": ("Polynomial", keys.PolynomialKeys, _polynomial),
+    "resection": ("Space resection", keys.ResectionKeys, _resection),
+    "bundle": ("Bundle adjustment", keys.BundleKeys, _bundle),
+    "frame": ("Intermediate frame", keys.FrameKeys, _frame),
+    "curvature": ("Earth curvature", keys.CurvatureKeys, _curvature),
+    "pair-scales": ("Scales of pairs of points", keys.PairScalesKeys, _pair_scales),
+    "closed-form": ("Errors of points in closed form", keys.ClosedFormKeys, _closed_form),
+    "deformation": ("Deformation of a model", keys.DeformationKeys, _deformation),
 }
 
 

@@ -14,7 +14,7 @@ import photostrip
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.source import digest
-from photostrip.library.again import compare_again
+from photostrip.library.comparison import compare_again
 from photostrip.result.statement.certificate import result_hash
 from tests.calls import Capture
 from tests.loops import nonempty
