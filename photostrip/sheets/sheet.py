@@ -6,9 +6,10 @@ power ``"mm² e4"``; ``"ratio 2"`` has no unit. JSON and CSV have a few more tha
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,6 +100,7 @@ class Field:
     below: str | None = None  # second line of the head; None: the unit
     rank: int = 0
     shown: bool = True
+    of: str | Callable[[Any], Any] = ""  # what of an object stands in it, see ``listed``; empty: what the key names
 
     @property
     def name(self) -> str:
@@ -123,10 +125,6 @@ def fields(keys: str, form: str, heads: str = "", below: str | None = None, rank
     """Return columns of the same form; blanks between keys and heads, a low line within a head."""
     names: Sequence[str | None] = [each.replace("_", " ") for each in heads.split()] or [None] * len(keys.split())
     return tuple(Field(key, form, name, below, rank) for key, name in zip(keys.split(), names, strict=True))
-
-
-def _parts(said: Sequence[str | Part]) -> tuple[Part, ...]:
-    return tuple(Words(each) if isinstance(each, str) else each for each in said)
 
 
 @dataclass(frozen=True)
@@ -254,6 +252,12 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
         case "md":
             return to_markdown(title, sections)
     return to_text(title, sections, width or USUAL)
+
+
+def listed(key: str, title: str, columns: Sequence[Field], objects: Iterable[Any], **more: Any) -> Rows:  # noqa: ANN401 (of rows)
+    """Return a table with a row for each object, in which each column knows what stands in it."""
+    values = [attrgetter(each.of or each.key) if isinstance(each.of, str) else each.of for each in columns]
+    return Rows(key, title, columns, [[value(each) for value in values] for each in objects], **more)
 
 
 def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:
