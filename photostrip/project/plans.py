@@ -762,12 +762,10 @@ class CurvatureKeys(StepKeys):
     """The Earth's curvature below plane coordinates, from their middle."""
 
     radius: Positive = key("Of the Earth, without a latitude", EARTH_RADIUS, unit="m")
-    latitude: Annotated[Number, After(bounded(Range(-90.0, 90.0, "deg")))] | None = key(
+    latitude: Annotated[Number, Range(-90.0, 90.0, "deg")] | None = key(
         "Of the strip: the radius of WGS 84 in its azimuth counts", None, unit="deg"
     )
-    azimuth: Annotated[Number, After(bounded(Range(-360.0, 360.0, "deg")))] = key(
-        "Of the strip, clockwise from north", 0.0, unit="deg"
-    )
+    azimuth: Annotated[Number, Range(-360.0, 360.0, "deg")] = key("Of the strip, clockwise from north", 0.0, unit="deg")
 
     @property
     def radius_of_strip(self) -> float:
