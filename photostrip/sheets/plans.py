@@ -8,7 +8,8 @@ import numpy as np
 
 from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, by_efficiency, compare, suitability
 from photostrip.planning.screening import ARC_MINUTES, ScreeningOutcome
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, listed
+from photostrip.report.page.tables import Cell, Field, fields
+from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden, listed
 from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.terrestrial.accuracy import PLACES, DisplacementSpec, plan_displacements
 from photostrip.units import MICROMETRES

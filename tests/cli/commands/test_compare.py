@@ -17,7 +17,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.result_lines import line_finder
 from photostrip.formats.text import writing
 from photostrip.project.tolerances import load_tolerances
-from photostrip.report.page.junit import Case, to_junit
+from photostrip.report.page.messages import Case, to_junit
 from tests.loops import nonempty
 from tests.results import by_rows, case, in_tables
 from tests.source_tree import ROOT
