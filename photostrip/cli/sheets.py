@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
+import os
 import shlex
-import tempfile
-from collections.abc import Callable, Sequence
+import subprocess
+import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -20,10 +19,6 @@ from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, PhotostripError
 from photostrip.planning import PlanKind
 from photostrip.strip import StepName
 from photostrip.terrestrial import TerrestrialKind
-
-if TYPE_CHECKING:
-    from photostrip.notes import Document
-    from photostrip.sheets.sources import Place, Shown
 
 Keys = Annotated[
     Path | None,
@@ -149,7 +144,7 @@ def sources(
     function. Exit code 1: a number is not the one that is known.
     """
     with failures_as(form):
-        from photostrip.sheets.sources import found_places, places_sheet, sources_sheet, write_inputs
+        from photostrip.sheets.sources import found_places, places_sheet, shown_places, sources_sheet, write_inputs
 
         if inputs is not None:
             write_inputs(inputs)
@@ -157,36 +152,16 @@ def sources(
             if inputs is None:
                 deliver(sources_sheet(), form)
             return 0
-        shown = _shown(found_places(place), write_inputs)
+        shown = shown_places(found_places(place), _typed)
         deliver(places_sheet(shown), form)
         return 0 if all(each.agrees for each in shown) else 1
 
 
-def _shown(places: Sequence[Place], write_inputs: Callable[[Path], None]) -> list[Shown]:
-    """Run the commands of places in a folder with what they read, and look up what each prints."""
-    from photostrip.sheets.sources import Shown, quantity_of
-
-    documents: dict[str, Document] = {}
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        write_inputs(Path())
-        for command in dict.fromkeys(each.command for each in places):
-            documents[command] = document_of(command)
-    return [Shown(each, quantity_of(documents[each.command], each.quantity)) for each in places]
-
-
-def document_of(command: str) -> Document:
-    """Run commands with && between; return what the last one prints, or the trace that it writes, as JSON."""
-    from photostrip.cli.main import main
-
-    *before, last = (shlex.split(each)[1:] for each in command.split("&&"))
-    trace = next((each for each in last if each.endswith(".txt")), None)
-    wanted = [*last, "--format", "json"] if trace is None else [each.replace(".txt", ".json") for each in last]
-    printed = io.StringIO()
-    for each in (*before, wanted):
-        with contextlib.redirect_stdout(printed):
-            code = main(each)
-        if code not in (EXIT_DONE, EXIT_TOLERANCE):
-            raise PhotostripError(f"`photostrip {shlex.join(each)}` ended with {code}")
-    text = printed.getvalue() if trace is None else Path(trace).with_suffix(".json").read_text(encoding="utf-8")
-    document: Document = json.loads(text)
-    return document
+def _typed(arguments: Sequence[str], folder: Path) -> str:
+    """Run a command of this program in a folder, as a shell would, and return what it prints."""
+    here = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # also where the program is not installed
+    command = [sys.executable, "-m", "photostrip", *arguments]
+    done = subprocess.run(command, cwd=folder, env=os.environ | here, capture_output=True, text=True, encoding="utf-8")
+    if done.returncode not in {EXIT_DONE, EXIT_TOLERANCE}:
+        raise PhotostripError(f"`photostrip {shlex.join(arguments)}` ended with {done.returncode}: {done.stderr}")
+    return done.stdout

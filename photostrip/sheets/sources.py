@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
 from importlib import resources
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from photostrip.errors import Fault, InputError
@@ -113,6 +116,35 @@ def write_inputs(folder: Path) -> None:
     for file in resources.files("photostrip.sheets").joinpath("inputs").iterdir():
         if file.name.endswith((".csv", ".yaml")):
             (folder / file.name).write_text(file.read_text(encoding="utf-8"), encoding="utf-8")
+
+
+def shown_places(chosen: Sequence[Place], run: Callable[[Sequence[str], Path], str]) -> list[Shown]:
+    """Run the commands of places in a folder with what they read, and look up what each prints.
+
+    run: runs the words of a command after ``photostrip`` in a folder and returns what is printed.
+    """
+    documents: dict[str, Document] = {}
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        write_inputs(folder)
+        for command in dict.fromkeys(each.command for each in chosen):
+            documents[command] = document_of(command, folder, run)
+    return [Shown(each, quantity_of(documents[each.command], each.quantity)) for each in chosen]
+
+
+def document_of(command: str, folder: Path, run: Callable[[Sequence[str], Path], str]) -> Document:
+    """Return as JSON what the last of commands with && between prints, or the trace that it writes."""
+    *before, last = (shlex.split(each)[1:] for each in command.split("&&"))
+    for each in before:
+        run(each, folder)
+    trace = next((each for each in last if each.endswith(".txt")), None)
+    if trace is None:
+        text = run([*last, "--format", "json"], folder)
+    else:
+        run([each.replace(".txt", ".json") for each in last], folder)
+        text = (folder / trace).with_suffix(".json").read_text(encoding="utf-8")
+    document: Document = json.loads(text)
+    return document
 
 
 def places_sheet(shown: Sequence[Shown]) -> Sheet:

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.cli.sheets import document_of
-from photostrip.sheets.sources import Shown, found_places, places, quantity_of
+from photostrip.sheets.sources import Shown, document_of, found_places, places, quantity_of
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -96,7 +95,7 @@ def test_a_command_runs_its_functions_and_prints_the_number(
         seen |= called
     traces = [each for each in shlex.split(command) if each.endswith(".txt")]
     text += "".join((folder / each).read_text(encoding="utf-8") for each in traces)
-    document = document_of(command)
+    document = document_of(command, folder, lambda arguments, _: executed(list(arguments))[2])
     for row in rows:
         assert code_of(row.function) in seen, row.function
         assert Shown(row, quantity_of(document, row.quantity)).agrees, row.place
