@@ -9,13 +9,12 @@ from pathlib import Path
 
 from photostrip.comparison import Tolerances, compare_results
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.result_json import read_result
-from photostrip.formats.text.files import from_disk
-from photostrip.formats.text.source import Source, digest, reading_from, seen_from
+from photostrip.formats.files import Source, digest, from_disk, reading_from, seen_from
+from photostrip.formats.result_json import read_result
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
 from photostrip.project.reading import LARGEST_PROJECT
-from photostrip.result.statement.edited import is_edited
+from photostrip.result.certificate import is_edited
 
 
 def compare_again(result: Path, project: Path | None = None, tolerances: Tolerances | None = None) -> Document:

@@ -96,7 +96,7 @@ def place_of(baseline: Path, *, update: bool = False) -> Path:
 
 def _opened(given: Result | str | PathLike[str] | Mapping[str, Any], name: str) -> tuple[Document, str]:
     """Return a document with what it is called in messages; a mapping has the name that is given."""
-    from photostrip.formats.output.result_json import checked, parsed
+    from photostrip.formats.result_json import checked, parsed
 
     if isinstance(given, Result):
         return given.document, given.name
@@ -116,7 +116,7 @@ def results_below(folder: Path) -> dict[str, Path]:
 
 def _folders(above: Path, now: Mapping[str, Path], baselines: Path, allowed: Tolerances) -> Document:
     """Compare every result below a folder with the baseline of the same name below another."""
-    from photostrip.formats.output.result_json import read_baseline
+    from photostrip.formats.result_json import read_baseline
 
     if not baselines.is_dir():
         message = f"is no folder, and {above} is one of {counted(len(now), 'result')}"

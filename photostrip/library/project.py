@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import LARGEST_FILE, from_disk
-from photostrip.formats.text.source import Source, current, digest
-from photostrip.formats.text.source import reading_from as accounted
+from photostrip.formats.files import LARGEST_FILE, Source, current, digest, from_disk
+from photostrip.formats.files import reading_from as accounted
 from photostrip.library.result import Result
 from photostrip.notes import counted
 
@@ -80,7 +79,7 @@ class Project:
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""
-        from photostrip.result.statement.certificate import certificate_of
+        from photostrip.result.certificate import certificate_of
 
         loaded, inputs = self.loaded, self.loaded.inputs
         grids = {Path(grid) for frame in (*computed.frames, computed.output) for grid in frame.grids}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.source import Source
+from photostrip.formats.files import Source
 from photostrip.library.project import Project, assignments_of, loaded_from, reading_from
 
 KEY = "photostrip_simulation"  # number of the schema
@@ -29,7 +29,7 @@ class Simulation:
     @property
     def truth(self) -> dict[str, Any]:
         """The content of truth.json: true coordinates, perspective centres, rotations; the errors that were put in."""
-        from photostrip.formats.output.result_json import parsed
+        from photostrip.formats.result_json import parsed
 
         with reading_from(self._source):
             return dict(parsed(TRUTH))
@@ -48,7 +48,7 @@ class Simulation:
 
         Raises InputError where a project stands there that no simulation wrote.
         """
-        from photostrip.formats.text.writing import write_files
+        from photostrip.formats.files import write_files
 
         there = Path(folder) / PROJECT
         if there.exists() and not there.with_name(TRUTH).exists():
@@ -80,7 +80,7 @@ def simulate(
 
 
 def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
-    from photostrip.formats.output.simulation import project_files, summary
+    from photostrip.formats.simulation import project_files, summary
     from photostrip.project.simulation import load_specification
 
     specification = load_specification(path, assignments)

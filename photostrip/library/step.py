@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.measured.steps import read_rays, read_step
+from photostrip.formats.terrestrial import read_rays, read_step
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
 from photostrip.library import steps
 from photostrip.library.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of

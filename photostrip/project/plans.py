@@ -11,7 +11,7 @@ import numpy as np
 
 from photostrip.camera import Camera
 from photostrip.errors import InputError
-from photostrip.formats.text.findings import suggestion
+from photostrip.formats.faults import suggestion
 from photostrip.planning import camera_efficiency
 from photostrip.planning.ideal_strip import BUNDLE, LEAST_PHOTOS, METHODS, USES, ControlLayout, Spot, StripGeometry
 from photostrip.planning.ideal_strip import LAYOUTS as STRIP_LAYOUTS

@@ -15,7 +15,7 @@ from photostrip.report.html import to_html
 from photostrip.report.page.angles import UNITS
 from photostrip.report.page.parts import Table
 from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.result.adjustment.bundle import kinds
+from photostrip.result.bundle import kinds
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
 from tests.results import solved, spec, write_project
