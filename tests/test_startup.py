@@ -99,12 +99,6 @@ def test_modules_are_a_budget(arguments: tuple[str, ...], most: int) -> None:
     assert not {"rich", "jinja2", "gzip"} & libraries
 
 
-@pytest.mark.slow
-def test_reading_a_project_does_not_load_the_walk() -> None:
-    code = "import sys, photostrip.project.loading\nprint('photostrip.pipeline.run' in sys.modules)"
-    assert python(code) == "False"
-
-
 def test_every_command_explains_itself_without_loading_the_mathematics() -> None:
     """In one process: what the help of one command loads stays, and none loads any of it."""
     code = "from photostrip.cli.main import COMMANDS, main\nfor name in COMMANDS: assert main([name, '--help']) == 0"

@@ -70,7 +70,7 @@ def simulate(
     DIR gets project.yaml with its tables, and truth.json: the true coordinates, perspective centres and rotations,
     and the gross errors that were put in. The same SPEC gives the same files on every machine.
     """
-    from photostrip.library.simulation import simulated
+    from photostrip.library.project import simulated
 
     simulation = simulated(spec, assignments or [])
     simulation.write(output)

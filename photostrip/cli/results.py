@@ -168,9 +168,8 @@ def compare(
     project is adjusted again as the certificate of the result says; files that have changed since are a difference.
     """
     from photostrip.formats.result_json import line_finder, text_of
-    from photostrip.library.again import compare_again
     from photostrip.library.comparison import compare as compared
-    from photostrip.library.comparison import results_below
+    from photostrip.library.comparison import compare_again, results_below
     from photostrip.project.tolerances import load_tolerances
     from photostrip.report.commands.compare_findings import compare_cases, compare_findings
     from photostrip.report.commands.comparisons import TRUTH, comparison_report

@@ -38,7 +38,7 @@ def plan(
     with gross errors in pairs, or one of your own. `photostrip schema --plan KIND` lists the keys.
     """
     with failures_as(form):
-        from photostrip.library.plan import planned
+        from photostrip.library.sheets import planned
         from photostrip.report.pictures.plan_strip import strip_plan_picture
 
         check_target(output, depfile, picture=kind == "strip")
@@ -66,7 +66,7 @@ def terrestrial(
     one, with known distances. cameras: those that can be named. `photostrip schema --terrestrial KIND` lists the keys.
     """
     with failures_as(form):
-        from photostrip.library.terrestrial import terrestrial as computed
+        from photostrip.library.sheets import terrestrial as computed
         from photostrip.report.pictures.displacements import displacement_picture
 
         moved = kind == "displacement"
@@ -92,7 +92,8 @@ def step(
 ) -> None:
     """Take one step of the method alone, from a table of points; image coordinates in mm.
 
-    `photostrip schema --step NAME` lists its keys: principal_distance, base, unit, sigma_um and others.
+    `photostrip schema --step NAME` lists its keys: principal_distance, base, unit, angles and others.
+    Weights may be left out.
 
     \b
     Columns of FILE:
@@ -101,12 +102,17 @@ def step(
       relative      point, x_left, y_left, x_right, y_right
       intersection  the same
       chain         photo, omega, phi, kappa (degrees)
-      scale         point, x, y, z, x_next, y_next, z_next
+      scale         point, x, y, z, x_next, y_next, z_next, weight
       strip         photo, point, x, y
-      absolute      point, x, y, z, x_ground, y_ground, z_ground
+      absolute      point, x, y, z, x_ground, y_ground, z_ground, weight
       polynomial    point, x, y, z, misclosure
       resection     point, x, y, x_ground, y_ground, z_ground
       bundle        photo, point, x, y
+      frame         point, longitude, latitude, height
+      curvature     point, x, y, z
+      pair-scales   as absolute
+      closed-form   point, x, y
+      deformation   point, x, y, dz
     """  # noqa: D301 (the sign by which a paragraph keeps its lines)
     with failures_as(form):
         from photostrip.library.step import step as computed

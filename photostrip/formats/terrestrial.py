@@ -1,4 +1,4 @@
-"""Tables of terrestrial photogrammetry (image points, directions, epochs, pseudo-parallaxes), and of single steps."""
+"""Tables of terrestrial photogrammetry: image points, directions, epochs, pseudo-parallaxes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.errors import InputError
 from photostrip.formats.faults import Findings
-from photostrip.formats.measured import POINT, Measurements, numbers, read_measurements, repeated_rows
+from photostrip.formats.measured import POINT, repeated_rows
 from photostrip.formats.tables import Column, Table, read_table
 from photostrip.terrestrial.normal_case import SIDES
 
@@ -159,41 +158,3 @@ def reference_values(read: EpochTable, findings: Findings) -> Floats:
         message = f"{names[column]} of point {read.points[point]} stands in no row"
         findings.add(read.table.fault(first[int(point)], names[column], message, "no-reference", expected="a number"))
     return found
-
-
-XY, XYZ, GROUND = ("x", "y"), ("x", "y", "z"), ("x_ground", "y_ground", "z_ground")
-PHOTOS = (("x_left", "y_left"), ("x_right", "y_right"))
-COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "interior": (XY, ("x_photo", "y_photo")),
-    "refine": (XY,),
-    "relative": PHOTOS,
-    "intersection": PHOTOS,
-    "chain": (("omega", "phi", "kappa"),),
-    "scale": (XYZ, ("x_next", "y_next", "z_next")),
-    "absolute": (XYZ, GROUND),
-    "polynomial": (XYZ, ("misclosure",)),
-    "resection": (XY, GROUND),
-    "bundle": (GROUND,),  # of its control
-}
-MARK = Column("point", aliases=("mark", "photo", *POINT.aliases))
-
-
-def read_step(file: str, step: str) -> tuple[list[str], list[Floats]]:
-    """Read the table of a step: ids, and its coordinates by system; or raise every fault of it."""
-    findings = Findings()
-    systems = COLUMNS[step]
-    table = read_points(file, (MARK, *(each for names in systems for each in numbers(*names))), findings)
-    findings.stop()
-    if table is None:  # cannot be: what is not read has a fault, and stop() raised it
-        raise InputError(f"{file} cannot be read")
-    return table.cells("point"), [table.columns(*names) for names in systems]
-
-
-def read_rays(file: str) -> Measurements:
-    """Read image coordinates of photos in flight order, or raise every fault of their table."""
-    findings = Findings()
-    read = read_measurements([file], findings)
-    findings.stop()
-    if read is None:  # cannot be, see above
-        raise InputError(f"{file} cannot be read")
-    return read

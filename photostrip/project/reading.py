@@ -671,6 +671,8 @@ def _fault(kind: type[Section], root: Node, problem: Any) -> Fault:  # noqa: ANN
         if not fix and name in homes(kind):
             fix = f"`{name}` belongs in `{homes(kind)[name]}`"
     expected = "" if error.code == "unknown-key" and fix else error.expected
+    if error.code == "schema-number":
+        expected = f"{key_path(at)}: {expected}"
     return place.fault(error.message, error.code, key=key_path(at), expected=expected, fix=fix)
 
 

@@ -25,13 +25,13 @@ from photostrip.project.sections import (
     Number,
     Pair,
     Positive,
+    SchemaNumber,
     Section,
     Triple,
     Whole,
     Words,
     YAxis,
     key,
-    schema_number,
     wrong,
 )
 
@@ -188,9 +188,6 @@ class Models(Section):
     axes: Words = key("`level`: nearly, turned about the vertical; `any`: lying in any way", USUAL_MODELS.axes)
     hand: Words = key("`right-handed` or `left-handed`", USUAL_MODELS.hand)
     centers: Flag = key("Measure the perspective centres", USUAL_MODELS.centers)
-
-
-SchemaNumber = Annotated[int, schema_number("photostrip_simulation", " of simulations")]
 
 
 class SimulationFile(Section):

@@ -20,6 +20,7 @@ from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
 from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, written
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
+from photostrip.strip.pair_screening import stages, tested
 from photostrip.strip.polynomial import POWERS, degree_of
 from photostrip.strip.relative_orientation import ELEMENTS
 
@@ -30,6 +31,7 @@ PAIRED = 15  # control points whose 105 distances can still be read
 PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")
 TURNS, TURN_HEADS = ("alpha", "omega", "kappa"), ("α", "ω", "κ")
 SIMILARITY, SIMILARITY_HEADS = ("xi", "eta", "theta"), ("ξ", "η", "θ")
+TESTS = {"parallax": "|q|, mm,", "grubbs": "Grubbs' G", "tau": "tau"}
 SYMBOLS = {
     "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
     "alpha1 to kappa2": "elements of relative orientation in the base frame, written with a prime",
@@ -237,6 +239,7 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
                 if orientation.pairs.pair[each.row] == number
             ],
         )
+        yield from _largest(result, strip, number, names)
         base = (bases[number] * formed.first.base).tolist()
         angles = [*(np.array(base_angles(bases[number])) * factor).tolist(), *_turned(rotations[number], factor)]
         told = ", ".join(f"{name} {value:z.6f}" for name, value in zip(own[0], base, strict=True))
@@ -254,6 +257,20 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
             ),
         )
         yield _points(result, strip, number, names)
+
+
+def _largest(result: Result, strip: StripResult, number: int, names: tuple[str, ...]) -> Iterator[Rows]:
+    """Give the largest value of each test of single residuals that is left in a pair, beside its limit."""
+    orientation, ids = strip.of_photos.orientation, result.refined.observations.point_ids
+    rows = orientation.pairs.rows_of(np.array([number]))
+    tests = []
+    for test, bound in stages(result.settings.relative, strip.of_photos.sigma):
+        value, limit, _ = (each[rows] for each in tested(orientation, test, bound))
+        worst = int(np.argmax(np.where(orientation.used[rows], value, -np.inf)))
+        tests.append((*names, test, ids[orientation.point[rows[worst]]], value[worst], limit[worst]))
+    said = [f"{TESTS[test]} {value:.4g} at {point}, limit {limit:.4g}" for *_, test, point, value, limit in tests]
+    columns = (*hidden("strip", "left", "right", "test", "point"), *hidden("value", "limit", form="ratio g5"))
+    yield Rows("pair_tests", "", columns, tests, above=[f"What is left: {'; '.join(said)}."] if said else [])
 
 
 def _round(names: tuple[str, ...], each: PairRound, count: int, unit: str, title: str) -> Rows:

@@ -14,7 +14,7 @@ import photostrip
 from photostrip.cli.main import main
 from photostrip.formats.files import digest
 from photostrip.formats.result_json import read_result, to_json
-from photostrip.library.again import compare_again
+from photostrip.library.comparison import compare_again
 from photostrip.result.certificate import result_hash
 from tests.calls import Capture
 from tests.loops import nonempty

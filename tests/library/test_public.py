@@ -39,12 +39,13 @@ MEMBERS = {
     ],
 }  # fmt: skip
 STEPS = [
-    "absolute", "bundle", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection",
-    "scale_transfer", "strip",
+    "absolute", "angles", "bundle", "chain", "closed_form", "curvature", "deformation", "frame", "from_angles",
+    "interior", "intersection", "pair_scales", "polynomial", "refine", "relative", "resection", "scale_transfer",
+    "strip",
 ]  # fmt: skip
 STEP_VALUES = [
-    "Absolute", "Bundle", "Camera", "Distortion", "Interior", "Intersection", "OrientedPhoto", "Relative",
-    "Strip",
+    "Absolute", "Bundle", "Camera", "ClosedForm", "Distortion", "Frame", "Interior", "Intersection", "OrientedPhoto",
+    "PairScales", "Paraboloid", "Relative", "Strip",
 ]  # fmt: skip
 ERRORS = ["GeometryError", "InputError", "PhotostripError"]
 

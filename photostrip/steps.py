@@ -3,7 +3,8 @@
 Image coordinates are millimetres, x to the right and y up, reduced to the principal point but in ``interior`` and
 ``refine``; the principal distance is in millimetres, angles in radians. Models have the unit of the base that is given;
 ground coordinates are Cartesian, metres: tangent plane, geocentric, or a map where its curvature does not matter.
-Rotations take image axes, or those of a model, to the axes named beside them.
+Rotations take image axes, or those of a model, to the axes named beside them. ``from_angles`` makes them of angles in a
+system, as ``"alpha-omega-kappa"``, ``angles`` gives these back.
 """
 
 from __future__ import annotations
@@ -19,12 +20,24 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.ground_frame import WGS84
+from photostrip.geodesy.local_frame import (
+    EARTH_RADIUS,
+    Ellipsoid,
+    IntermediateFrame,
+    curvature_correction,
+    geocentric_from_geodetic,
+    mean_position,
+)
 from photostrip.geometry import plane
-from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
+from photostrip.geometry.similarity import PairScales, Similarity, collinearity
+from photostrip.geometry.similarity import pair_scales as distances
 from photostrip.network.adjustment import IterationStep, solve
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.network.reliability import cofactors_of
+from photostrip.planning.closed_form import coefficients, control_sums
+from photostrip.planning.deformation import Paraboloid, fit_paraboloid
 from photostrip.points import PhotoPoints
 from photostrip.strip.corrections import Bending, refraction_constant, undistort
 from photostrip.strip.formed_strip import (
@@ -43,17 +56,28 @@ __all__ = [
     "Absolute",
     "Bundle",
     "Camera",
+    "ClosedForm",
     "Distortion",
+    "Frame",
     "Interior",
     "Intersection",
     "OrientedPhoto",
+    "PairScales",
+    "Paraboloid",
     "Relative",
     "Strip",
     "absolute",
+    "angles",
     "bundle",
     "chain",
+    "closed_form",
+    "curvature",
+    "deformation",
+    "frame",
+    "from_angles",
     "interior",
     "intersection",
+    "pair_scales",
     "polynomial",
     "refine",
     "relative",
@@ -209,20 +233,116 @@ def chain(rotations: ArrayLike, first: ArrayLike | None = None) -> Floats:
     return hand_on_rotations(np.asarray(rotations, float).reshape(-1, 3, 3), start)
 
 
-def scale_transfer(first: ArrayLike, second: ArrayLike) -> tuple[float, Floats]:
+def scale_transfer(first: ArrayLike, second: ArrayLike, weights: ArrayLike | None = None) -> tuple[float, Floats]:
     """Bring the second of two models to the scale of the first.
 
     first, second: (n, 3), common points in each model, from the perspective centre of the photo that both share.
-    Returns the factor that the second model is multiplied by, the mean over the points, and what each point departs
-        from it, as a part of it (n,).
+    weights: (n,), of the points.
+    Returns the factor that the second model is multiplied by, the weighted mean over the points, and what each point
+        departs from it, as a part of it (n,).
+    Raises InputError where weights are negative or all zero.
 
     Source: [001] eq. 139-141.
     """
     one, other = _array(first, 3), _array(second, 3)
     _same(one, other)
+    weight = _weights(weights, len(one))
     ratios = np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
-    factor = float(ratios.mean())
+    factor = float(weight @ ratios / weight.sum())
     return factor, ratios / factor - 1
+
+
+def pair_scales(model: ArrayLike, ground: ArrayLike) -> PairScales:
+    """Compare the distances of all pairs of points (n, 3) in a model and on the ground (n, 3).
+
+    Returns the rows of each pair, both distances, and as ``mean`` the scale r, sum of D_G over sum of D.
+
+    Source: [001] eq. 147, 148.
+    """
+    source, target = _array(model, 3), _array(ground, 3)
+    _same(source, target)
+    if len(source) < 2:
+        raise InputError("two points are needed, to have a distance")
+    return distances(source, target)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Points in an intermediate frame at their middle, and the frame itself."""
+
+    frame: IntermediateFrame  # origin, axes M, azimuth; ``cartesian_from_intermediate`` is the way back, eq. 152
+    geocentric: Floats  # (n, 3), metres
+    points: Floats  # (n, 3): X in the azimuth, Y to the left of it, Z up, metres
+
+
+def frame(geodetic: ArrayLike, *, azimuth: float = 0.0, ellipsoid: Ellipsoid = WGS84) -> Frame:
+    """Take geodetic coordinates (n, 3), longitude and latitude in radians and height, into the frame at their middle.
+
+    azimuth: of the X axis, clockwise from north, radians.
+    ellipsoid: semi-axes a and b, metres.
+
+    Source: [001] eq. 142-144.
+    """
+    given = _array(geodetic, 3)
+    cartesian = geocentric_from_geodetic(given, ellipsoid)
+    lat, lon, _ = mean_position(given[:, 1], given[:, 0], given[:, 2])
+    found = IntermediateFrame.at_centre(cartesian, lat, lon, azimuth)
+    return Frame(found, cartesian, found.intermediate_from_cartesian(cartesian))
+
+
+def curvature(xyz: ArrayLike, *, radius: float = EARTH_RADIUS, origin: ArrayLike | None = None) -> Floats:
+    """Fall of the Earth below the tangent plane (n,) at plane coordinates (n, 3), D^2 / 2R: what heights exceed z by.
+
+    radius: of the Earth, metres.
+    origin: (2,) or (3,), where the plane touches; default: the middle of the points.
+
+    Source: [001] eq. 153.
+    """
+    points = _array(xyz, 3)
+    middle = points.mean(axis=0) if origin is None else np.asarray(origin, float)
+    return curvature_correction(np.hypot(*(points[:, :2] - middle[:2]).T), radius)
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """Errors of points of an oriented model on level ground per error of each element of relative orientation."""
+
+    sums: Floats  # (15,): c1 to c15 over the control
+    coefficients: Floats  # (q, 3, 4): of x, y, height per dbz, dkappa, dalpha, domega
+
+
+def closed_form(
+    points: ArrayLike, control: ArrayLike, principal_distance: float, base: float, *, as_printed: bool = False
+) -> ClosedForm:
+    """Errors of points in closed form.
+
+    points, control: (q, 2), (n, 2), x and y from the left nadir, mm at photo scale; control is given in full.
+    principal_distance, base: the depth of the ground and the base at photo scale, mm.
+    as_printed: with the misprints of the source.
+
+    Source: [000] eq. 9-11.
+    """
+    xy, known = _array(points, 2), _array(control, 2)
+    sums = control_sums(known)
+    if len(known) < 3 or sums[0] * sums[1] - sums[2] ** 2 <= ON_A_LINE * sums[0] * sums[1]:
+        message = "control on one line, or fewer than three points: the tilt about it is not determined"
+        raise GeometryError(message, code="control-deficient")
+    found = coefficients(xy, known, base, principal_distance, printed=as_printed)
+    return ClosedForm(sums, found)
+
+
+def deformation(xy: ArrayLike, dz: ArrayLike, *, sigma: float = 1.0) -> Paraboloid:
+    """Fit the surface dZ = E0 + A x + B y + C x y + D x^2 that twist C and bending D make of the heights of a model.
+
+    xy, dz: (n, 2), x along the base; (n,), heights of the model minus given ones.
+    sigma: standard deviation of dz, in its unit; with a redundancy of three or more that of the residuals counts.
+    Raises GeometryError where the points do not determine the surface.
+
+    Source: [003] eq. 10.12.
+    """
+    place, heights = _array(xy, 2), np.asarray(dz, float)
+    _same(place, heights)
+    return fit_paraboloid(place, heights, np.full(len(heights), sigma))
 
 
 def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, sigma: float = 0.005) -> OrientedPhoto:
@@ -310,7 +430,7 @@ def absolute(model: ArrayLike, ground: ArrayLike, weights: ArrayLike | None = No
     """
     source, target = _array(model, 3), _array(ground, 3)
     _same(source, target)
-    weight = np.ones(len(source)) if weights is None else np.asarray(weights, float)
+    weight = _weights(weights, len(source))
     if collinearity(source[weight > 0]) < ON_A_LINE**2:
         message = "fewer than three points, or all on one line: the rotation about it is not determined"
         raise GeometryError(message, code="control-deficient")
@@ -456,6 +576,16 @@ def _array(values: ArrayLike, width: int, *, gaps: bool = False) -> Floats:
     found = np.asarray(values, float)
     if found.ndim != 2 or found.shape[1] != width or not (gaps or np.isfinite(found).all()):
         raise InputError(f"an array of finite numbers with {width} columns is needed, not one of shape {found.shape}")
+    return found
+
+
+def _weights(weights: ArrayLike | None, count: int) -> Floats:
+    """Return weights of points, 1 where none are given, or refuse them."""
+    if weights is None:
+        return np.ones(count)
+    found = np.asarray(weights, float)
+    if found.shape != (count,) or not (np.isfinite(found).all() and found.min(initial=0.0) >= 0.0 < found.sum()):
+        raise InputError(f"{count} weights are needed, 0 or more and not all zero")
     return found
 
 
