@@ -284,9 +284,9 @@ def test_verbose_prints_every_section(result: Path, call: Call) -> None:
 
 
 def test_what_a_killed_run_left_behind_is_removed_by_the_next(project: Path, tmp_path: Path) -> None:
-    dying = "import os; from photostrip.formats.text import writing; from photostrip.cli.main import main\n"
+    dying = "import os; from photostrip.formats import files; from photostrip.cli.main import main\n"
     dying += (
-        f"writing._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
+        f"files._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
     )
     done = subprocess.run([sys.executable, "-c", dying], cwd=tmp_path, capture_output=True, check=False)
     assert done.returncode == -9
