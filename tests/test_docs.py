@@ -114,7 +114,7 @@ def test_no_page_of_the_site_links_out_of_it() -> None:
 
 @cache
 def tags_listed() -> set[str]:
-    return set(re.findall(r"^\| \[([^\]]+)\] \|", (ROOT / "docs/sources.md").read_text(encoding="utf-8"), re.MULTILINE))
+    return set(re.findall(r"(?m)^(?:\||-) \[([^\]]+)\] ", (ROOT / "docs/sources.md").read_text(encoding="utf-8")))
 
 
 def source_lines(text: str) -> list[str]:

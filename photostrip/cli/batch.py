@@ -163,7 +163,7 @@ def _write_summaries(run: Run, code: int, *, html: bool) -> list[InputError]:
     from photostrip.formats.files import write_files
     from photostrip.report.commands.batch import batch_junit, batch_sections
     from photostrip.report.html import batch_html
-    from photostrip.report.page.text import to_text
+    from photostrip.report.page.layout import to_text
 
     files = {
         "summary.txt": to_text("", batch_sections(run.outcomes, everything=True)),

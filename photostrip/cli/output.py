@@ -41,9 +41,9 @@ class Messages:
 
 def ascii_only() -> bool:
     """Whether stdout can show ASCII letters only."""
-    from photostrip.report.page import console
+    from photostrip.report.page import layout
 
-    return not console.speaks_unicode(sys.stdout)
+    return not layout.speaks_unicode(sys.stdout)
 
 
 def print_json(document: Document) -> None:
@@ -55,18 +55,18 @@ def print_json(document: Document) -> None:
 
 def print_sections(title: str, sections: Iterable[Section], width: int | None = None, *, markdown: bool) -> None:
     """Print sections as Markdown, or as text: in colours and as wide as the terminal, where there is one."""
-    from photostrip.report.page import console, text
+    from photostrip.report.page import layout
 
     if markdown:
-        sys.stdout.write(text.to_markdown(title, sections, ascii_only=ascii_only()))
+        sys.stdout.write(layout.to_markdown(title, sections, ascii_only=ascii_only()))
     else:
-        console.print_report(title, sections, sys.stdout, width)
+        layout.print_report(title, sections, sys.stdout, width)
 
 
 def print_result(document: Document, form: Format, width: int | None, **parts: Any) -> None:  # noqa: ANN401 (of report_sections)
     """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
     from photostrip.library.result import report_of, report_sections
-    from photostrip.report.page.console import page_width
+    from photostrip.report.page.layout import page_width
 
     if form == "text":
         print_sections(*report_sections(document, width=width or page_width(), **parts), width, markdown=False)

@@ -69,7 +69,7 @@ def report(
     saved = read_result(file)
     with faults_of_edited("reported", (saved, file)):
         document = as_reported(saved, file)
-        sections_of(document, everything=True)  # what is incomplete is refused, whatever is printed
+        sections_of(document)  # what is incomplete is refused, whatever is printed
         if plots is not None:
             from photostrip.report.pictures.result import picture_files
 
@@ -120,7 +120,7 @@ def statement(
             print_json(found)
             return exit_code(found["status"])
         from photostrip.formats.files import write_text
-        from photostrip.report.statements.statement import statement_report
+        from photostrip.report.sections.statement import statement_report
         from photostrip.sheets.sheet import rendered
 
         title, sections = statement_report(found, quiet=quiet)
@@ -171,10 +171,8 @@ def compare(
     from photostrip.library.comparison import compare as compared
     from photostrip.library.comparison import compare_again, results_below
     from photostrip.project.tolerances import load_tolerances
-    from photostrip.report.commands.compare_findings import compare_cases, compare_findings
-    from photostrip.report.commands.comparisons import TRUTH, comparison_report
-    from photostrip.report.page.junit import to_junit
-    from photostrip.report.page.messages import annotated
+    from photostrip.report.commands.compare import TRUTH, compare_cases, compare_findings, comparison_report
+    from photostrip.report.page.messages import annotated, to_junit
 
     if (baseline is None) is not again or (update and again) or (project is not None and not again):
         refuse("BASELINE", "give a BASELINE, or --again without one (and with it alone --project)")

@@ -44,16 +44,16 @@ class Comparison:
 
     def report(self, *, everything: bool = False) -> str:
         """Return the comparison as text."""
-        from photostrip.report.commands.comparisons import comparison_report
-        from photostrip.report.page.text import to_text
+        from photostrip.report.commands.compare import comparison_report
+        from photostrip.report.page.layout import to_text
 
         return to_text(*comparison_report(self.document, everything=everything))
 
     def __repr__(self) -> str:
         """Say in a sentence what was found."""
-        from photostrip.report.commands.comparisons import comparison_headline
+        from photostrip.report.commands.compare import headline
 
-        return f"<Comparison: {comparison_headline(self.document)}>"
+        return f"<Comparison: {headline(self.document)}>"
 
 
 def compare(

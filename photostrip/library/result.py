@@ -206,18 +206,18 @@ class Result:
         everything: False for the short report that the command prints by default; the page always has everything.
         Raises InputError for a saved result that is not whole; ValueError for another form.
         """
-        from photostrip.report.sections.accuracy_report import SectionName, sections_of
+        from photostrip.report.sections.accuracy_report import NAMES, sections_of
         from photostrip.result.certificate import as_reported, faults_of_edited
 
         _require_form(form, get_args(ReportForm))
-        if unknown := sorted(set(sections) - set(SectionName)):
+        if unknown := sorted(set(sections) - set(NAMES)):
             message = f"the report has no section {', '.join(unknown)}"
-            raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
+            raise InputError(Fault(message, "section", expected=f"one of {', '.join(NAMES)}"))
         if self.computed is not None or form == "json":
             return report_of(self.document, form, names=sections, everything=everything)
         with faults_of_edited("reported", (self.document, self.name)):
             document = as_reported(self.document, self.name)
-            sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
+            sections_of(document)  # what is incomplete is refused, whatever is asked for
             return report_of(document, form, names=sections, everything=everything)
 
     def statement(
@@ -328,10 +328,9 @@ def report_sections(
 ) -> tuple[str, Sequence[Section]]:
     """Return title and sections of the report; the title stands over whole reports only."""
     from photostrip.report.page.layout import USUAL
-    from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
+    from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 
-    chosen = [SectionName(each) for each in names]
-    sections = chosen_sections(document, quiet=quiet, everything=everything, names=chosen, width=width or USUAL)
+    sections = chosen_sections(document, quiet=quiet, everything=everything, names=names, width=width or USUAL)
     return "" if quiet or names else title_of(document), sections
 
 
@@ -357,12 +356,12 @@ def report_of(
             from photostrip.report.page.messages import annotated, result_findings
 
             return annotated(result_findings(document))
-    from photostrip.report.page import layout, text
+    from photostrip.report.page import layout
 
     title, sections = report_sections(document, width=width, **parts)
     if form == "md":
-        return text.to_markdown(title, sections, ascii_only=ascii_only)
-    return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
+        return layout.to_markdown(title, sections, ascii_only=ascii_only)
+    return layout.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
 
 
 def _require_form(form: str, known: Sequence[str]) -> None:

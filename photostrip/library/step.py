@@ -30,8 +30,9 @@ from photostrip.project.conversion import semi_axes
 from photostrip.project.reading import read_keys
 from photostrip.project.sections import Section
 from photostrip.report.page.parts import DASH, Facts
+from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
-from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
+from photostrip.sheets.sheet import Rows, Sheet, by_columns
 from photostrip.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort

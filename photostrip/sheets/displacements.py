@@ -11,9 +11,10 @@ from photostrip.arrays import Floats
 from photostrip.notes import counted
 from photostrip.project.terrestrial import ReportFrame, Survey
 from photostrip.report.page.parts import DASH, Words
+from photostrip.report.page.tables import Cell, Field, fields
 from photostrip.result.numbers import natural_rank
 from photostrip.sheets.directions import camera_facts
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, plain
+from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden, plain
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import OneStation, OneStationResult
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step

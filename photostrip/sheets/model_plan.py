@@ -17,8 +17,9 @@ from photostrip.planning.closed_form import ORDER
 from photostrip.planning.deformation import DEFORMATION_TERMS, base_frame_elements, relative_errors
 from photostrip.planning.model_plan import BothForms, Forecast, GivenErrors, ModelSpec, NamedPoint, simple_accuracy
 from photostrip.planning.single_model import ELEMENTS, FREE, PARAMETERS
+from photostrip.report.page.tables import Cell, Field, fields, with_unit
 from photostrip.result.numbers import rms
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, by_columns, fields, hidden, plain, with_unit
+from photostrip.sheets.sheet import Fact, Rows, Sheet, by_columns, hidden, plain
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}

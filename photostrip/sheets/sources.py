@@ -11,7 +11,8 @@ from typing import NamedTuple
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
 from photostrip.planning.model_plan import source_example
 from photostrip.report.page.parts import Words
-from photostrip.sheets.sheet import Field, Rows, Sheet, fields
+from photostrip.report.page.tables import Field, fields
+from photostrip.sheets.sheet import Rows, Sheet
 from photostrip.terrestrial.accuracy import EXAMPLES, worked
 
 # [004a]: errors that were put in, found by the residual parallax, found by Grubbs' test, missed; good points rejected

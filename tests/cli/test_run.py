@@ -13,7 +13,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats import files
 from photostrip.formats.result_json import read_result
-from photostrip.report.sections.accuracy_report import SectionName, sections_of
+from photostrip.report.sections.accuracy_report import NAMES, sections_of
 from photostrip.report.sections.overview import MOST_LINES
 from tests.loops import nonempty
 from tests.results import spec, write_project
@@ -270,9 +270,9 @@ def test_a_section_is_printed_alone(result: Path, call: Call) -> None:
 def test_a_section_that_no_report_has_is_refused_with_the_names(result: Path, call: Call) -> None:
     code, out, err = call("report", result, "--section", "chek")
     assert (code, out) == (2, "")
-    assert "'chek' is not one of 'verdict', 'findings'" in err
+    assert "the report has no section 'chek', but verdict, findings" in err
     names = call("report", "--help")[1].split("NAME: ")[1].split(".")[0]
-    assert " ".join(names.split()) == ", ".join(SectionName)
+    assert " ".join(names.split()) == ", ".join(NAMES)
 
 
 def test_verbose_prints_every_section(result: Path, call: Call) -> None:

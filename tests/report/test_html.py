@@ -69,7 +69,7 @@ def page() -> Page:
 
 def texts(document: Document) -> Iterator[str]:
     """Give everything that the sections say."""
-    for section in sections_of(document, everything=True):
+    for section in sections_of(document):
         yield section.title
         for part in section.parts:
             if isinstance(part, Words):

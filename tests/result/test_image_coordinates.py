@@ -13,7 +13,7 @@ from photostrip.formats.result_files import csv_pieces
 from photostrip.library.result import Result
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.parts import Table
-from photostrip.report.sections.accuracy_report import SectionName, chosen_sections
+from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.points import refined_table
 from photostrip.simulation import Models, simulate
 from photostrip.simulation.spec import Film
@@ -99,13 +99,13 @@ def test_ids_are_quoted_in_refined_csv() -> None:
 
 
 def test_the_report_shows_every_mark_and_coefficient() -> None:
-    (section,) = chosen_sections(film(angle_unit="gon").document, names=[SectionName.FIDUCIALS])
+    (section,) = chosen_sections(film(angle_unit="gon").document, names=["fiducials"])
     shapes, coefficients, residuals = (part for part in section.parts if isinstance(part, Table))
     assert (len(shapes.rows), len(coefficients.rows), len(residuals.rows)) == (5, 10, 40)
     assert {column.unit for column in shapes.columns} == {"", "µm", "gon"}
     first = film().document["fiducial_marks"][0]
     assert residuals.rows[0] == ("1001", first["mark"], f"{first['vx_um']:.1f}", f"{first['vy_um']:.1f}")
-    (section,) = chosen_sections(film("projective").document, names=[SectionName.FIDUCIALS])
+    (section,) = chosen_sections(film("projective").document, names=["fiducials"])
     coefficients = [part for part in section.parts if isinstance(part, Table)][1]
     assert [row[1] for row in coefficients.rows[:3]] == ["x", "y", "divided by"]
 

@@ -15,7 +15,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Precision
-from photostrip.report.page.text import to_text
+from photostrip.report.page.layout import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.derived import ellipses
 from photostrip.result.document import document_of
@@ -151,8 +151,8 @@ def test_the_report_names_the_least_precise_points() -> None:
     text = to_text(title_of(known.document), sections_of(known.document), 100)
     worst = known.document["precision"]["points"]["height"]["worst"]
     assert "5.0 µm, as stated" in text
-    assert f"m at point {worst}" in text
-    assert "least precise points" in text
+    assert f"m at {worst}" in text
+    assert "the least precise in plan" in text
     assert "at photo" in text
 
 

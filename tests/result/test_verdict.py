@@ -11,7 +11,7 @@ import pytest
 
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.report.page.text import to_text
+from photostrip.report.page.layout import to_text
 from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.document import document_of
 from photostrip.result.given import stand_out

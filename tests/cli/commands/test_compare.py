@@ -15,7 +15,7 @@ from photostrip.comparison.comparison import SETS, UNITS
 from photostrip.errors import InputError
 from photostrip.formats.result_json import line_finder, to_json
 from photostrip.project.tolerances import load_tolerances
-from photostrip.report.page.junit import Case, to_junit
+from photostrip.report.page.messages import Case, to_junit
 from tests.loops import nonempty
 from tests.results import by_rows, case, in_tables
 from tests.source_tree import ROOT

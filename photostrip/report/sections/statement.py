@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from photostrip.notes import Document, listed
-from photostrip.report.page.numbers import fixed, metres, signed
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import Field, metres, signed, tabulated
 
 STYLES = {"tested": "good", "reduced": "look", "not met": "failed"}
 HEADLINES = {
@@ -20,31 +21,30 @@ CONFIRMED = (
 )
 LINE = "________________________________"
 CENTIMETRES = 100.0
+MEAN_ERROR = 128  # number of the measure that has a sign
 NAMES = {"photostrip": "photostrip", "python": "Python", "numpy": "numpy", "scipy": "scipy", "pyproj": "pyproj"}
 OF_FRAMES = {"proj": "PROJ", "epsg": "EPSG data set"}
 
 
-def statement_section(document: Document) -> Section:
+def statement(document: Document) -> Iterator[Part]:
+    if "statement" not in document:
+        return
     block = document["statement"]
     if block["status"] == "refused":
-        parts: list[Part] = [Words("No accuracy can be stated by a norm:")]
-        parts += [Words(f"{_reason(each)}; {each['fix']}", mark="-") for each in block["reasons"]]
-        return Section("Accuracy statement", tuple(parts))
-    parts = [Words(text, mark="-") for text in block["sentences"]]
-    parts.append(_accuracies(block))
-    parts += [Words(text, mark="-") for text in block["remarks"]]
-    parts.append(Words("photostrip statement writes it with the measures of ISO 19157, to be signed."))
-    return Section("Accuracy statement", tuple(parts))
-
-
-def _reason(reason: Document) -> str:
-    points = f": {listed(reason['points'])}" if reason["points"] else ""
-    return f"{reason['message']}{points}"
+        yield Words("No accuracy can be stated by a norm:")
+        for each in block["reasons"]:
+            points = f": {listed(each['points'])}" if each["points"] else ""
+            yield Words(f"{each['message']}{points}; {each['fix']}", mark="-")
+        return
+    yield from (Words(text, mark="-") for text in block["sentences"])
+    yield _accuracies(block)
+    yield from (Words(text, mark="-") for text in block["remarks"])
+    yield Words("photostrip statement writes it with the measures of ISO 19157, to be signed.")
 
 
 def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, tuple[Section, ...]]:
     """Return title and sections of a statement; with `quiet` what is stated alone."""
-    verdict = Words(_headline(document), STYLES[document["status"]])
+    verdict = Words(HEADLINES[document["status"]], STYLES[document["status"]])
     sentences = tuple(Words(text, mark=f"{place}.") for place, text in enumerate(document["sentences"], 1))
     if quiet:
         return "", (Section("", (verdict, *sentences)),)
@@ -58,10 +58,6 @@ def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, t
     sign = Facts(tuple((label, LINE) for label in ("Place, date", "Name, office", "Signature")))
     end = Section("To be signed", (*remarks, Words(CONFIRMED), sign))
     return f"Accuracy statement: {document['name']}", (*found, end)
-
-
-def _headline(document: Document) -> str:
-    return HEADLINES[document["status"]]
 
 
 def _facts(document: Document) -> Facts:
@@ -81,66 +77,72 @@ def _facts(document: Document) -> Facts:
 
 
 def _accuracies(block: Document) -> Table:
-    rows = [{"part": part, "count": None, "rmse": None, "survey": None, **block[part]} for part in SYMBOLS]
+    keys = ("count", "rmse", "survey", "accuracy")
     columns = (
-        words("", "part"),
-        words("", lambda row: SYMBOLS[row["part"]]),
-        number("points", lambda row: row["count"], lambda count: "" if count is None else str(count)),
-        number("rms", "rmse", _centimetres, "cm"),
-        number("survey", "survey", _centimetres, "cm"),
-        number("together", "accuracy", _centimetres, "cm"),
-        number("class", "class_cm", lambda size: fixed(size, 0), "cm"),
+        *(Field("part", head=""), Field("symbol", head=""), Field("points", "count")),
+        *(Field(head, "cm 1") for head in ("rms", "survey", "together")),
+        Field("class", "cm 0"),
     )
+    rows = []
+    for part, symbol in SYMBOLS.items():
+        count, *sizes = (block[part].get(key) for key in keys)
+        of_class = block[part]["class_cm"]
+        rows.append((part, symbol, "" if count is None else count, *map(_centimetres, sizes), of_class))
     note = "rms: of the differences; survey: of the check points themselves; class: the narrowest of whole centimetres"
-    return tabulated(rows, columns, note=note)
+    return tabulated(columns, rows, note)
 
 
-def _centimetres(value: float | None) -> str:
-    return fixed(None if value is None else CENTIMETRES * value, 1)
+def _centimetres(value: float | None) -> float | None:
+    return None if value is None else CENTIMETRES * value
 
 
 def _measures(document: Document) -> Table:
     circle, line = document["circle"], document["line"]
-    rows = [{"norm": f"ISO 19157, {each['id']}", **each} for each in document["iso_19157"]]
-    nssda = {"alias": "", "norm": "NSSDA"}
-    rows += [
-        {**nssda, "name": "1.7308 RMSE_r, 95 %", "part": "plan", "value_m": circle["radial95"]},
-        {**nssda, "name": "2.4477 (RMSE_x + RMSE_y) / 2, 95 %", "part": "plan", "value_m": circle["ce95"]},
-        {**nssda, "name": "1.9600 RMSE_z, 95 %", "part": "height", "value_m": line["le95"]},
+    rows = [
+        (
+            f"ISO 19157, {each['id']}",
+            each["name"] + (f" ({each['alias']})" if each["alias"] else ""),
+            each["part"],
+            (signed if each["id"] == MEAN_ERROR else metres)(each["value_m"]),
+        )
+        for each in document["iso_19157"]
     ]
-    columns = (
-        words("norm", "norm"),
-        words("measure", lambda row: row["name"] + (f" ({row['alias']})" if row["alias"] else "")),
-        words("of", "part"),
-        number("value", lambda row: row, lambda row: (signed if row.get("id") == 128 else metres)(row["value_m"]), "m"),
-    )
-    return tabulated(rows, columns, note="of the differences at the check points, without the error of their survey")
+    rows += [
+        ("NSSDA", "1.7308 RMSE_r, 95 %", "plan", metres(circle["radial95"])),
+        ("NSSDA", "2.4477 (RMSE_x + RMSE_y) / 2, 95 %", "plan", metres(circle["ce95"])),
+        ("NSSDA", "1.9600 RMSE_z, 95 %", "height", metres(line["le95"])),
+    ]
+    columns = (*map(Field, ("norm", "measure", "of")), Field("value", "m 3"))
+    return tabulated(columns, rows, "of the differences at the check points, without the error of their survey")
 
 
 def _check_points(document: Document) -> Table:
-    axes = zip(document["axes_of_frame"], ("dx", "dy", "dz"), strict=True)
     columns = (
-        words("point", "id"),
-        *(number(f"d {axis}", key, signed, "m") for axis, key in axes),
-        number("plan", "plan", metres, "m"),
-        number("height", "height", signed, "m"),
+        Field("point"),
+        *(Field(f"d {axis}", "m +3") for axis in document["axes_of_frame"]),
+        *(Field("plan", "m 3"), Field("height", "m +3")),
     )
-    return tabulated(document["check_points"], columns, note="adjusted minus given")
+    keys = ("id", "dx", "dy", "dz", "plan", "height")
+    rows = ([row[key] for key in keys] for row in document["check_points"])
+    return tabulated(columns, rows, "adjusted minus given")
 
 
-def certificate_section(document: Document) -> Section:
+def certificate(document: Document) -> Iterator[Part]:
+    if "certificate" not in document:
+        return
     block = document["certificate"]
-    found = block["versions"]
+    versions = block["versions"]
+    frames = ", ".join(f"{OF_FRAMES[name]} {versions[name]}" for name in OF_FRAMES if versions[name])
     epochs = list(dict.fromkeys(f"{epoch:.3f}" for epoch in block["epochs"] if epoch is not None))
-    facts = Facts(
+    yield Facts(
         (
             ("Result", block["result_sha256"]),
             ("Project with all defaults", block["resolved_sha256"]),
             ("Overridden", "; ".join(block["set"]) or "nothing"),
             ("Epochs", ", ".join(epochs) or "none given"),
-            ("Computed by", ", ".join(f"{NAMES[name]} {found[name]}" for name in NAMES)),
-            ("Frames by", ", ".join(f"{OF_FRAMES[name]} {found[name]}" for name in OF_FRAMES if found[name]) or DASH),
+            ("Computed by", ", ".join(f"{NAMES[name]} {versions[name]}" for name in NAMES)),
+            ("Frames by", frames or DASH),
         )
     )
-    files = tabulated([*block["inputs"], *block["grids"]], (words("file", "file"), words("SHA-256", "sha256")))
-    return Section("Certificate", (facts, files))
+    files = [(row["file"], row["sha256"]) for rows in (block["inputs"], block["grids"]) for row in rows]
+    yield tabulated((Field("file"), Field("SHA-256")), files)

@@ -1,25 +1,72 @@
-"""What was decided automatically is said, with its reason; every control coordinate shows what it weighed."""
+"""Sections by themselves: the verdict and its findings, what was decided automatically, what control weighed."""
 
 from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from photostrip.report.page.parts import Facts, Table
-from photostrip.report.sections.decisions import WEIGHTS_SHOWN, decisions_section, weights_section
+from photostrip.plausibility import found as finding
+from photostrip.report.page.messages import MOST_OF_A_KIND, finding_of
+from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.sections import points
+from photostrip.report.sections.project import decisions
+from photostrip.report.sections.verdict import cures, findings, verdict
+from photostrip.result.verdict import POOR_CONTROL, _control
 from tests.loops import nonempty
+from tests.reports import saved
 from tests.results import by_rows, case, in_tables
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from photostrip.report.page.parts import Part
 
 
 def facts(document: dict[str, object]) -> dict[str, str]:
-    (part,) = decisions_section(in_tables(document)).parts
+    (part,) = decisions(in_tables(document))
     return dict(part.rows) if isinstance(part, Facts) else {}
 
 
-def weights(document: dict[str, object], *, everything: bool = False) -> Table:
-    (part,) = weights_section(in_tables(document), everything=everything).parts
+def weights(document: dict[str, object]) -> Table:
+    (part,) = points.weights(in_tables(document))
     assert isinstance(part, Table)
     return part
+
+
+def texts(parts: Iterable[Part]) -> list[str]:
+    return [part.text for part in parts if isinstance(part, Words)]
+
+
+@pytest.mark.parametrize(("count", "more"), [(6, 0), (7, 1), (13, 7)])
+def test_what_of_the_verdict_is_not_shown_is_counted(count: int, more: int) -> None:
+    document = copy.deepcopy(saved())
+    document["verdict"]["look_at"] = [f"reason {number}" for number in range(count)]
+    said = texts(verdict(document, 6))
+    rest = f"{more} more things: --section verdict, or `verdict` in result.json"
+    assert [text for text in said if "`verdict`" in text] == [rest] * (more > 0)
+    assert sum(text.startswith("reason ") for text in said) == 6
+    assert sum(text.startswith("reason ") for text in texts(verdict(document))) == count
+
+
+@pytest.mark.parametrize(("ratio", "reasons"), [(None, 0), (POOR_CONTROL, 0), (POOR_CONTROL + 0.01, 1)])
+def test_control_is_poor_beyond_the_limit(ratio: float | None, reasons: int) -> None:
+    assert len(list(_control({"summary": {"control": {"normalised": ratio}}, "control": []}))) == reasons
+
+
+def test_the_short_report_shows_every_kind_of_finding_the_long_one_every_finding() -> None:
+    document = copy.deepcopy(saved())
+    shared = [finding("P301", f"point {number} stands for two points", "") for number in range(40)]
+    outside = finding("P402", "control[0] lies elsewhere", "correct the crs")
+    document["findings"] = [finding_of(each) for each in (*shared, outside)]
+    short, long = texts(cures(document, 12)), texts(findings(document))
+    assert [sum(text.startswith("P301 one id for two points (") for text in each) for each in (short, long)] == [
+        MOST_OF_A_KIND, 40
+    ]  # fmt: skip
+    assert all(sum(text.startswith("P402") for text in each) == 1 for each in (short, long))
+    assert any("35 more" in text for text in short)
 
 
 @pytest.mark.parametrize("frame", ["projected", "local", "north first"])
@@ -74,14 +121,3 @@ def test_coordinates_that_do_not_count_weigh_nothing() -> None:
     first = weights(document).rows[0]
     assert (first[2], first[3], first[5], first[6]) == ("–",) * 4
     assert first[4] != "–"
-
-
-def test_long_lists_are_cut_and_say_so() -> None:
-    document = by_rows(case("projected").document)
-    row = next(each for each in document["control"] if each["role"] == "control")
-    document["control"] = [row | {"id": f"G{n}", "list": 1 + n % 2} for n in range(40)]
-    table = weights(document)
-    assert len(table.rows) == WEIGHTS_SHOWN
-    assert "16 more points: --section weights, or `control` in result.json" in table.note
-    assert "axes of each list" in table.note
-    assert len(weights(document, everything=True).rows) == 40
