@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from photostrip import steps
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.measured.steps import read_rays, read_step
+from photostrip.formats.steps import read_rays, read_step
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.local_frame import geodetic_from_geocentric
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles

@@ -9,8 +9,7 @@ import numpy as np
 
 from photostrip.camera import Camera
 from photostrip.errors import InputError
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import LARGEST_NUMBER
+from photostrip.formats.faults import LARGEST_NUMBER, suggestion
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.local_frame import EARTH_RADIUS, radius_in_azimuth
 from photostrip.planning import camera_efficiency
