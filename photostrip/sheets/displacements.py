@@ -231,11 +231,11 @@ def _epochs(result: Monitoring, frame: ReportFrame) -> Iterator[Rows]:
 def _positions(result: Monitoring, frame: ReportFrame) -> Rows:
     """Give the coordinates of all points in all epochs."""
     order = list(frame.order)
-    names = ("x", "y", "z", "sigma_x", "sigma_y", "sigma_z")
     columns = (
-        Field("point", shown=False),
-        Field("epoch", shown=False),
-        *(Field(name, "m 4", shown=False) for name in names),
+        Field("point"),
+        Field("epoch"),
+        *(Field(axis, "m 3", name) for axis, name in zip("xyz", frame.axes, strict=True)),
+        *fields("sigma_x sigma_y sigma_z", "m 4", "± ± ±"),
     )
     rows = [
         (
@@ -248,7 +248,7 @@ def _positions(result: Monitoring, frame: ReportFrame) -> Rows:
         for row in _points(result)
         for number, epoch in enumerate(result.series.epochs)
     ]
-    return Rows("positions", "", (*columns, Field("parallax_um", "um 2", shown=False)), rows)
+    return Rows("positions", "Positions", (*columns, Field("parallax_um", "um 1", "p vertical")), rows)
 
 
 def _rates(result: Monitoring, frame: ReportFrame) -> Rows:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.result_files import to_csv
 from photostrip.notes import Document
 from photostrip.report.page.layout import USUAL, to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
@@ -176,7 +176,7 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
     """Return sections as a file holds them: ``text`` so wide, ``md``, ``html``, or their document as ``json``."""
     match form:
         case "json":
-            from photostrip.formats.output.result_json import to_json
+            from photostrip.formats.result_json import to_json
 
             return to_json(document)
         case "html":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import checked
+from photostrip.formats.result_json import checked
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

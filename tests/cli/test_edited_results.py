@@ -13,7 +13,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.errors import InputError
-from photostrip.formats.output.result_json import read_result, to_json
+from photostrip.formats.result_json import read_result, to_json
 from photostrip.result.table import plain_of
 from tests.reports import RESULT, saved
 

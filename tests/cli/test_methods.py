@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
+from photostrip.formats.result_json import read_result
 from photostrip.pipeline.inputs import METHODS
 from photostrip.result.table import plain_of, rows_of
 from tests.loops import nonempty

@@ -15,7 +15,7 @@ from photostrip import steps
 from photostrip.camera import Camera, Distortion
 from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
