@@ -121,6 +121,11 @@ def hidden(*keys: str, form: str = "") -> tuple[Field, ...]:
     return tuple(Field(key, form, shown=False) for key in keys)
 
 
+def constant(**values: Any) -> tuple[Field, ...]:  # noqa: ANN401 (whatever stands in a cell)
+    """Return columns that stand in JSON and CSV alone, with the same value in every row of ``listed``."""
+    return tuple(Field(key, shown=False, of=lambda _, value=value: value) for key, value in values.items())
+
+
 def fields(keys: str, form: str, heads: str = "", below: str | None = None, rank: int = 0) -> tuple[Field, ...]:
     """Return columns of the same form; blanks between keys and heads, a low line within a head."""
     names: Sequence[str | None] = [each.replace("_", " ") for each in heads.split()] or [None] * len(keys.split())
