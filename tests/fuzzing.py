@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
-from photostrip.formats.output import result_files
+from photostrip.formats import result_files
 from photostrip.result.description import Columns, described
 from photostrip.simulation.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import LARGEST_FILE, from_disk
-from photostrip.formats.text.source import Source, current, digest
-from photostrip.formats.text.source import reading_from as accounted
+from photostrip.formats.files import LARGEST_FILE, Source, current, digest, from_disk
+from photostrip.formats.files import reading_from as accounted
 from photostrip.library.result import Result
 from photostrip.notes import counted
 
@@ -81,7 +80,7 @@ class Project:
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""
-        from photostrip.result.statement.certificate import certificate_of
+        from photostrip.result.certificate import certificate_of
 
         loaded, inputs = self.loaded, self.loaded.inputs
         grids = {Path(grid) for frame in (*computed.frames, computed.output) for grid in frame.grids}
@@ -252,7 +251,7 @@ class Simulation:
     @property
     def truth(self) -> dict[str, Any]:
         """The content of truth.json: true coordinates, perspective centres, rotations; the errors that were put in."""
-        from photostrip.formats.output.result_json import parsed
+        from photostrip.formats.result_json import parsed
 
         with reading_from(self._source):
             return dict(parsed(TRUTH))
@@ -271,7 +270,7 @@ class Simulation:
 
         Raises InputError where a project stands there that no simulation wrote.
         """
-        from photostrip.formats.text.writing import write_files
+        from photostrip.formats.files import write_files
 
         there = Path(folder) / PROJECT_FILE
         if there.exists() and not there.with_name(TRUTH).exists():
@@ -300,7 +299,7 @@ def simulate(
 
 
 def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
-    from photostrip.formats.output.simulation import project_files, summary
+    from photostrip.formats.simulation import project_files, summary
     from photostrip.project.simulation import load_specification
 
     specification = load_specification(path, assignments)

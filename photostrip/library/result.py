@@ -12,14 +12,14 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.result_json import checked
+from photostrip.formats.result_json import checked
 from photostrip.notes import Document, named
 from photostrip.result import table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.formats.text.writing import Content
+    from photostrip.formats.files import Content
     from photostrip.pipeline.results import Result as Computed
     from photostrip.report.page.parts import Section
     from photostrip.report.pictures.svg import Picture
@@ -206,18 +206,18 @@ class Result:
         everything: False for the short report that the command prints by default; the page always has everything.
         Raises InputError for a saved result that is not whole; ValueError for another form.
         """
-        from photostrip.report.sections.accuracy_report import SectionName, sections_of
-        from photostrip.result.statement.edited import as_reported, faults_of_edited
+        from photostrip.report.sections.accuracy_report import NAMES, sections_of
+        from photostrip.result.certificate import as_reported, faults_of_edited
 
         _require_form(form, get_args(ReportForm))
-        if unknown := sorted(set(sections) - set(SectionName)):
+        if unknown := sorted(set(sections) - set(NAMES)):
             message = f"the report has no section {', '.join(unknown)}"
-            raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
+            raise InputError(Fault(message, "section", expected=f"one of {', '.join(NAMES)}"))
         if self.computed is not None or form == "json":
             return report_of(self.document, form, names=sections, everything=everything)
         with faults_of_edited("reported", (self.document, self.name)):
             document = as_reported(self.document, self.name)
-            sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
+            sections_of(document)  # what is incomplete is refused, whatever is asked for
             return report_of(document, form, names=sections, everything=everything)
 
     def statement(
@@ -229,7 +229,7 @@ class Result:
         classes_cm: classes that a contract asks for, by ``plan`` and ``height``.
         Raises InputError with every reason why nothing can be stated.
         """
-        from photostrip.result.statement.accuracy_statement import statement_document
+        from photostrip.result.statement import statement_document
 
         return statement_document(self.document, self.name, classes_cm)
 
@@ -252,8 +252,8 @@ class Result:
         return page | {name: "".join(pieces) for name, pieces in self._files().items()}
 
     def _files(self) -> dict[str, Iterable[str]]:
-        from photostrip.formats.output.result_files import beside_json
-        from photostrip.formats.output.result_json import json_pieces
+        from photostrip.formats.result_files import beside_json
+        from photostrip.formats.result_json import json_pieces
 
         tables = beside_json(self.document, self._resolved, self.computed)
         return tables | {RESULT: json_pieces(self.document)}
@@ -282,7 +282,7 @@ class Result:
         """
         from pathlib import Path
 
-        from photostrip.formats.text.writing import sweep, write_files
+        from photostrip.formats.files import sweep, write_files
 
         sweep(Path(folder))
         page: dict[str, Content] = {}
@@ -328,10 +328,9 @@ def report_sections(
 ) -> tuple[str, Sequence[Section]]:
     """Return title and sections of the report; the title stands over whole reports only."""
     from photostrip.report.page.layout import USUAL
-    from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
+    from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 
-    chosen = [SectionName(each) for each in names]
-    sections = chosen_sections(document, quiet=quiet, everything=everything, names=chosen, width=width or USUAL)
+    sections = chosen_sections(document, quiet=quiet, everything=everything, names=names, width=width or USUAL)
     return "" if quiet or names else title_of(document), sections
 
 
@@ -346,7 +345,7 @@ def report_of(
     """Return the report as text, Markdown, HTML, JSON (the document) or annotations of GitHub."""
     match form:
         case "json":
-            from photostrip.formats.output.result_json import to_json
+            from photostrip.formats.result_json import to_json
 
             return to_json(document, ascii_only=ascii_only)
         case "html":
@@ -357,12 +356,12 @@ def report_of(
             from photostrip.report.page.messages import annotated, result_findings
 
             return annotated(result_findings(document))
-    from photostrip.report.page import layout, text
+    from photostrip.report.page import layout
 
     title, sections = report_sections(document, width=width, **parts)
     if form == "md":
-        return text.to_markdown(title, sections, ascii_only=ascii_only)
-    return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
+        return layout.to_markdown(title, sections, ascii_only=ascii_only)
+    return layout.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
 
 
 def _require_form(form: str, known: Sequence[str]) -> None:
@@ -378,7 +377,7 @@ def read_result(path: str | PathLike[str]) -> Result:
     """
     from pathlib import Path
 
-    from photostrip.formats.output.result_json import read_baseline
+    from photostrip.formats.result_json import read_baseline
 
     file = Path(path)
     return Result(read_baseline(str(file / RESULT if file.is_dir() else file)))

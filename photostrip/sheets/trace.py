@@ -15,9 +15,10 @@ from photostrip.geometry.similarity import Similarity, pair_scales
 from photostrip.notes import counted
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.report.page.parts import Facts, Part, Words
+from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, constant, fields, hidden, listed, written
+from photostrip.sheets.sheet import Fact, Rows, Sheet, constant, hidden, listed
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
 from photostrip.strip.pair_screening import stages, tested

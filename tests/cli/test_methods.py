@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.formats.output.result_json import checked, read_result
+from photostrip.formats.result_json import checked, read_result
 from photostrip.pipeline.inputs import METHODS
 from tests.loops import nonempty
 from tests.source_tree import ROOT

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from photostrip import comparison
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances, baseline_of
-from photostrip.comparison.tolerances import UNITS
+from photostrip.comparison.comparison import UNITS
 from photostrip.errors import InputError
 from photostrip.library.comparison import compare
 from photostrip.result.distances import plan_and_height
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from tests.loops import nonempty
 from tests.results import by_rows, case, in_tables, rotation
 

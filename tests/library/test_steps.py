@@ -13,7 +13,7 @@ import photostrip
 from photostrip import steps
 from photostrip.camera import Camera, Distortion
 from photostrip.geometry.rotation import from_angles
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

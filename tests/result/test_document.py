@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.document import document_of
-from photostrip.result.numbers import natural, rounded, significant
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX, natural, rounded, significant
 from photostrip.result.summary import TOLERANCES, counts_of
 from photostrip.result.table import Table, plain_of
 from photostrip.simulation.simulation import simulate
