@@ -106,25 +106,6 @@ def _no_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("photostrip.pipeline.gate.of_result", lambda *_: ())
 
 
-class Backwards(pytest.Dir):  # type: ignore[misc]  # final for its names, which stay
-    """A folder that is read from its end."""
-
-    def collect(self) -> Iterator[pytest.Item | pytest.Collector]:
-        return reversed([*super().collect()])
-
-
-def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Dir | None:
-    """Let every other process read backwards: the first time, each compiles half of the tests and finds the others."""
-    if int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 2:
-        return Backwards.from_parent(parent, path=path)
-    return None
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Bring the tests into one order, from whichever end they were read."""
-    items.sort(key=lambda item: item.path)
-
-
 gc.set_threshold(NEW_OBJECTS)  # as the command does: 5 s of the tests
 gc.disable()  # until the tests are collected, which makes no cycles worth a search
 

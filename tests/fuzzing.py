@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
-from photostrip.formats.output import result_files
+from photostrip.formats import result_files
 from photostrip.result.description import Columns, described
 from photostrip.simulation.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES
@@ -37,8 +37,8 @@ OVERRIDES = [
     "observations.unit=px",
     "observations.sigma=1e-9",
     "observations.sigma=1e9",
-    "control[0].sigma=[1e-9, 1, 1e9]",
-    "control[0].axes=[up, north, east]",
+    "control[0].sigma=[1e-9,1,1e9]",
+    "control[0].axes=[up,north,east]",
     "control[0].crs=EPSG:4326",
     "control[0].crs=geocentric",
     "output.crs=EPSG:3857",
@@ -166,42 +166,46 @@ def cut_off(data: bytes, random: Random) -> bytes:
     return data[: random.randrange(len(data) + 1)]
 
 
-def line_removed(data: bytes, random: Random) -> bytes:
-    """Take out a line."""
+def lines_changed(data: bytes, random: Random) -> bytes:
+    """Take out a line, repeat it, once or very often, or exchange it with another."""
     lines = data.splitlines(keepends=True)
     if lines:
-        del lines[random.randrange(len(lines))]
-    return b"".join(lines)
-
-
-def line_repeated(data: bytes, random: Random) -> bytes:
-    """Repeat a line, once or very often."""
-    lines = data.splitlines(keepends=True)
-    if lines:
-        place = random.randrange(len(lines))
-        lines[place:place] = [lines[place]] * random.choice([1, 2, 1000])
-    return b"".join(lines)
-
-
-def lines_exchanged(data: bytes, random: Random) -> bytes:
-    """Exchange two lines."""
-    lines = data.splitlines(keepends=True)
-    if len(lines) > 1:
         one, two = random.randrange(len(lines)), random.randrange(len(lines))
-        lines[one], lines[two] = lines[two], lines[one]
+        match random.choice(["out", "again", "exchanged"]):
+            case "out":
+                del lines[one]
+            case "again":
+                lines[one:one] = [lines[one]] * random.choice([1, 2, 1000])
+            case _:
+                lines[one], lines[two] = lines[two], lines[one]
     return b"".join(lines)
 
 
-def fields_exchanged(data: bytes, random: Random) -> bytes:
-    """Exchange two columns of a table, its header or not."""
+def columns_changed(data: bytes, random: Random) -> bytes:
+    """Harm a column of a table: exchanged, scaled, dealt out anew; or bring its points onto one line."""
     lines = [line.split(b",") for line in data.splitlines()]
     width = min(map(len, lines), default=0)
-    if width < 2:
+    if width < 4:
         return data
     one, two = random.randrange(width), random.randrange(width)
-    for line in lines[random.choice([0, 1]) :]:
-        line[one], line[two] = line[two], line[one]
-    return b"\n".join(b",".join(line) for line in lines) + b"\n"
+    match random.choice(["exchanged", "scaled", "dealt", "on one line"]):
+        case "exchanged":  # its header or not
+            for line in lines[random.choice([0, 1]) :]:
+                line[one], line[two] = line[two], line[one]
+        case "scaled":  # kilometres, millimetres, nothing at all, an overflow
+            factor = random.choice([0.0, 1e-3, 1e3, 1e-9, 1e9, -1.0, 1e150])
+            for line in lines:
+                with contextlib.suppress(ValueError):
+                    line[one] = f"{float(line[one]) * factor:.6g}".encode()
+        case "dealt":  # ids permuted, or points numbered anew
+            values = random.sample([line[one] for line in lines[1:]], len(lines) - 1)
+            for line, value in zip(lines[1:], values, strict=True):
+                line[one] = value
+        case _:  # or to one place, with noise
+            noise, step = random.choice([0.0, 0.1, 20.0, 200.0]), random.choice([0.0, 1.0, 500.0])
+            for number, line in enumerate(lines[1:]):
+                line[1:4] = [f"{number * step * k + random.gauss(0.0, noise):.3f}".encode() for k in (1.0, 0.3, 0.1)]
+    return b"\n".join(map(b",".join, lines)) + b"\n"
 
 
 def written_otherwise(data: bytes, random: Random) -> bytes:
@@ -244,47 +248,6 @@ def made_noise(data: bytes, random: Random) -> bytes:
     return re.sub(rb"-?\d+\.\d+", noisy, data)
 
 
-def column_scaled(data: bytes, random: Random) -> bytes:
-    """Multiply a column of a table: kilometres, millimetres, nothing at all, an overflow."""
-    lines = data.splitlines()
-    width = min((line.count(b",") for line in lines), default=0)
-    if width < 1:
-        return data
-    column, factor = random.randint(1, width), random.choice([0.0, 1e-3, 1e3, 1e-9, 1e9, -1.0, 1e150])
-    found = []
-    for line in lines:
-        fields = line.split(b",")
-        with contextlib.suppress(ValueError):
-            fields[column] = f"{float(fields[column]) * factor:.6g}".encode()
-        found.append(b",".join(fields))
-    return b"\n".join(found) + b"\n"
-
-
-def column_permuted(data: bytes, random: Random) -> bytes:
-    """Deal the values of a column out again: ids permuted, or points numbered anew."""
-    lines = [line.split(b",") for line in data.splitlines()]
-    width = min(map(len, lines), default=0)
-    if width < 2:
-        return data
-    column = random.randrange(width)
-    values = [line[column] for line in lines[1:]]
-    random.shuffle(values)
-    for line, value in zip(lines[1:], values, strict=True):
-        line[column] = value
-    return b"\n".join(map(b",".join, lines)) + b"\n"
-
-
-def on_one_line(data: bytes, random: Random) -> bytes:
-    """Bring the points of a table of coordinates onto one line, or to one place, with noise."""
-    lines = [line.split(b",") for line in data.splitlines()]
-    if min(map(len, lines), default=0) < 4:
-        return data
-    noise, step = random.choice([0.0, 0.1, 20.0, 200.0]), random.choice([0.0, 1.0, 500.0])
-    for number, line in enumerate(lines[1:]):
-        line[1:4] = [f"{number * step * k + random.gauss(0.0, noise):.3f}".encode() for k in (1.0, 0.3, 0.1)]
-    return b"\n".join(map(b",".join, lines)) + b"\n"
-
-
 def keys_permuted(data: bytes, random: Random) -> bytes:
     """Exchange the words before two colons."""
     found = list(re.finditer(rb"[\w]+(?=:)", data))
@@ -295,9 +258,8 @@ def keys_permuted(data: bytes, random: Random) -> bytes:
 
 
 HARMS = [
-    text_put_in, text_put_in, value_replaced, value_replaced, bytes_put_in, cut_off, line_removed, line_repeated,
-    lines_exchanged, fields_exchanged, written_otherwise, number_moved, number_moved, made_noise, made_noise,
-    column_scaled, column_permuted, on_one_line, keys_permuted,
+    text_put_in, text_put_in, value_replaced, value_replaced, bytes_put_in, cut_off, *[lines_changed] * 3,
+    *[columns_changed] * 4, written_otherwise, number_moved, number_moved, made_noise, made_noise, keys_permuted,
 ]  # fmt: skip
 
 
@@ -305,22 +267,9 @@ HARMS = [
 
 
 def tried(case: Case, folder: Path, command: str) -> Outcome:
-    """Run a command on a case in a folder of its own and find what must not be.
+    """Run a command on a case in an empty folder and find what must not be.
 
-    Parameters
-    ----------
-    case : Case
-        Files and options.
-    folder : Path
-        An empty folder.
-    command : str
-        ``run`` or ``check``.
-
-    Returns
-    -------
-    Outcome
-        Its faults are empty when all is well: an exit code of the contract, no traceback, inputs as they were, all
-        files of a result or none.
+    Must be: an exit code of the contract, no traceback, inputs as they were, all files of a result or none.
     """
     for name, data in case.files.items():
         (folder / name).write_bytes(data)

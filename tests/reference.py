@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from typer.cli import get_docs_for_click
 
 import photostrip
-from photostrip.cli.main import COMMANDS, PROGRAM
+from photostrip.cli.main import PROGRAM
 from photostrip.cli.main import main as command_line
 from photostrip.plausibility import KINDS
 from photostrip.plausibility.finding import CAUSES
@@ -34,22 +35,8 @@ ARGUMENT = re.compile(r"(?:[a-z_]\w*(?:, (?=[a-z_]))?)+: ")  # ``left, right: ..
 PARAGRAPH = re.compile(r"(Returns|Raises|Source:?) ?")
 WIDTH = 100  # of a signature on one line
 STEPS = ("interior", "refine", "relative", "chain", "intersection", "scale_transfer", "strip", "absolute", "polynomial",
-         "resection", "bundle")  # fmt: skip
-
-
-EXIT_CODES = (
-    ("0", "Done."),
-    ("1", "Done, but a tolerance or a comparison failed."),
-    ("2", "Wrong usage, project file or data."),
-    ("3", "The geometry is too weak, singular or did not converge."),
-    ("70", "An internal error, a bug."),
-)
-VARIABLES = (
-    ("PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET, PHOTOSTRIP_VERBOSE, PHOTOSTRIP_DEBUG",
-     "Stand in for the options of these names."),
-    ("NO_COLOR", "When set, no colours are used."),
-    ("OMP_NUM_THREADS", "Threads of the numerical libraries; one when it is not set."),
-)  # fmt: skip
+         "resection", "bundle", "frame", "curvature", "pair_scales", "closed_form", "deformation", "from_angles",
+         "angles")  # fmt: skip
 
 
 def python_page() -> str:
@@ -180,37 +167,13 @@ def _escaped(text: str) -> str:
     )
 
 
-def every_command() -> Iterator[tuple[str, Any]]:
-    """Return every command with its name."""
-    root: Any = typer.main.get_command(PROGRAM)
-    return ((name, root.commands[name]) for name in COMMANDS)
-
-
-def records(command: Any, kind: str) -> Iterator[tuple[str, str]]:  # noqa: ANN401
-    """Return what ``--help`` says of the arguments, or of the options."""
-    with command.make_context(command.name, [], resilient_parsing=True) as context:
-        for each in command.get_params(context):
-            record = each.get_help_record(context)
-            if each.param_type_name == kind and record is not None:
-                yield record
-
-
 def command_page() -> str:
     """Write every command with its arguments and options, as ``--help`` has them."""
-    lines = ["# Reference: commands", "", "The same as `photostrip COMMAND --help`.", ""]
-    for name, command in every_command():
-        lines += [f"## `photostrip {name}`", ""]
-        for paragraph in (command.help or "").partition("\f")[0].replace("\b", "").strip().split("\n\n"):
-            lines += [_escaped(" ".join(paragraph.split())), ""]
-        rows = [*records(command, "argument"), *records(command, "option")]
-        lines += ["| argument, option | |", "|---|---|"]
-        lines += [f"| {_escaped(f'`{term}`')} | {_escaped(text)} |" for term, text in rows]
-        lines += ["", "```text", *textwrap.dedent(COMMANDS[name][1]).splitlines(), "```"]
-        lines.append("")
-    for title, entries in (("Exit codes", EXIT_CODES), ("Environment", VARIABLES)):
-        lines += [f"## {title}", "", "| | |", "|---|---|"]
-        lines += [*(f"| `{term}` | {_escaped(text)} |" for term, text in entries), ""]
-    return "\n".join(lines)
+    program = typer.main.get_command(PROGRAM)
+    context = typer.Context(program, info_name="photostrip", resilient_parsing=True)
+    page = get_docs_for_click(obj=program, ctx=context, name="photostrip", title="Reference: commands")
+    page = re.sub(r"(?s)\*\*Commands\*\*:\n.*?(?=\n## )", "", page, count=1)
+    return re.sub(r"\x08\n(.+):\n((?:  .+\n)+)", lambda found: f"{found[1]}:\n\n```text\n{found[2]}```\n", page)
 
 
 def key_pages() -> dict[str, str]:

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.formats.output.simulation import project_files
+from photostrip.formats.simulation import project_files
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.library import result as library
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
+from photostrip.result.derived import with_derived
 from photostrip.result.description import Block, Columns, described
 from photostrip.result.document import document_of
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.result.table import Table, as_array, in_frame
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
@@ -152,7 +153,7 @@ def in_tables(value: Any, block: Block | None = None) -> Any:  # noqa: ANN401
             found[key] = Table(key, columns, entry)
         elif isinstance(entry, Block) and isinstance(value.get(key), dict):
             found[key] = in_tables(value[key], entry)
-    return in_frame(found) if block is None and "frame" in found else found
+    return in_frame(with_derived(found)) if block is None and "frame" in found else found
 
 
 def columns_of(rows: list[Document]) -> dict[str, list[Any]]:

@@ -1,15 +1,19 @@
-"""What README.md and docs/ show is what the program does."""
+"""What README.md, docs/ and the site show is what the program does."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from functools import cache
 from typing import TYPE_CHECKING
 
 import pytest
 
+import photostrip
+from photostrip.cli.main import COMMANDS
 from tests.loops import nonempty
 from tests.pages import FRESH_CLONE, blocks, faults_of_page, pages, steps
+from tests.reference import TABLES, command_page, for_the_site, python_page
 from tests.source_tree import ROOT, modules
 
 if TYPE_CHECKING:
@@ -18,6 +22,11 @@ if TYPE_CHECKING:
 WITHOUT_FORKS = {"README.md"}  # what a user types first, as whole processes
 PAGES = [pytest.param(page, id=page.relative_to(ROOT).as_posix()) for page in pages()]
 LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
+ENTRY = re.compile(r"(?ms)^- (`[a-z0-9`, -]+)( \([^)]*\))?: (.*?)(?=^- |^#|\Z)")
+ERRORS = (ROOT / "docs" / "errors.md").read_text(encoding="utf-8")
+ENTRIES = [
+    (re.findall(r"`([^`]+)`", names), kind, " ".join(text.split())) for names, kind, text in ENTRY.findall(ERRORS)
+]
 
 
 @pytest.mark.slow
@@ -105,7 +114,7 @@ def test_no_page_of_the_site_links_out_of_it() -> None:
 
 @cache
 def tags_listed() -> set[str]:
-    return set(re.findall(r"^\| \[([^\]]+)\] \|", (ROOT / "docs/sources.md").read_text(encoding="utf-8"), re.MULTILINE))
+    return set(re.findall(r"(?m)^(?:\||-) \[([^\]]+)\] ", (ROOT / "docs/sources.md").read_text(encoding="utf-8")))
 
 
 def source_lines(text: str) -> list[str]:
@@ -126,3 +135,47 @@ def test_every_source_in_the_code_is_listed() -> None:
     found = {name: source_lines(path.read_text(encoding="utf-8")) for name, path in modules().items()}
     assert sum(map(len, found.values())) > 100
     assert [(name, each) for name, sources in found.items() for each in sources if unlisted(each, listed)] == []
+
+
+def test_every_code_on_the_page_is_told_and_stands_once() -> None:
+    source = "".join(path.read_text(encoding="utf-8") for path in modules().values())
+    named = Counter(code for codes, _, _ in ENTRIES for code in codes)
+    assert len(named) > 18
+    assert len(ENTRIES) == ERRORS.count("\n- `")
+    assert [code for code, times in named.items() if times > 1 or f'"{code}"' not in source] == []
+
+
+def test_an_entry_says_cause_and_cure() -> None:
+    for codes, kind, text in nonempty(ENTRIES):
+        cause, *cures = re.split(r"(?<=[.?]) (?=[A-Z])", text)
+        assert len(cause) > 15, codes
+        assert cures or kind.startswith(" (remark"), codes
+        assert text.endswith((".", "?")), codes
+
+
+def test_every_public_name_is_explained() -> None:
+    page = python_page()
+    parts = dict(re.findall(r"^### `(?:\w+\.)?(\w+)`\n\n(.+?)(?=^##|\Z)", page, re.MULTILINE | re.DOTALL))
+    assert sorted(parts) == sorted([*(set(photostrip.__all__) - {"steps"}), *photostrip.steps.__all__])
+    assert [name for name, text in nonempty(parts.items()) if not re.search(r"^[A-Z].*\w", text, re.MULTILINE)] == []
+    assert "- `left`, `right`: (n, 2), the same points on both photos." in parts["relative"]
+    assert "| `elements` | (5,): alpha1" in parts["Relative"]
+    assert "| `ok` | Whether nothing" in parts["Check"]
+    assert "| `faults` | All of them:" in parts["InputError"]
+    assert "#### `Table.where`" in page
+    assert "``" not in page.replace("```", "")
+
+
+def test_every_command_is_there_with_its_options() -> None:
+    page = command_page()
+    assert re.findall(r"^## `photostrip (.+)`$", page, re.MULTILINE) == list(COMMANDS)
+    assert "* `--trace FILE`: Write every iteration" in page
+    assert "Exit codes: 0 done;" in page
+
+
+def test_the_site_has_tables_and_fences_that_name_a_kind_alone() -> None:
+    assert for_the_site("```console exit=2\n$ a\n```\n") == "```console\n$ a\n```\n"
+    for name in TABLES:
+        assert f"\n<!-- table: {name} -->\n" in "".join(page.read_text(encoding="utf-8") for page in pages())
+    assert "| `grubbs_alpha` | 0.05 | Probability of" in for_the_site("<!-- table: project -->")
+    assert "| P401 | **control axes exchanged or left-handed** |" in for_the_site("<!-- table: findings -->")

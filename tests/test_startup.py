@@ -73,11 +73,6 @@ def test_no_command_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixt
     assert "Commands:" in captured.err
 
 
-def test_python_m_photostrip_is_the_same_command() -> None:
-    done = subprocess.run([sys.executable, "-m", "photostrip", "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout == f"photostrip {photostrip.__version__}\n"
-
-
 DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample
 
 
@@ -97,12 +92,6 @@ def test_modules_are_a_budget(arguments: tuple[str, ...], most: int) -> None:
     assert sum(name.startswith("photostrip") for name in loaded) <= most
     libraries = {name.partition(".")[0] for name in loaded}
     assert not {"rich", "jinja2", "gzip"} & libraries
-
-
-@pytest.mark.slow
-def test_reading_a_project_does_not_load_the_walk() -> None:
-    code = "import sys, photostrip.project.loading\nprint('photostrip.pipeline.run' in sys.modules)"
-    assert python(code) == "False"
 
 
 def test_every_command_explains_itself_without_loading_the_mathematics() -> None:

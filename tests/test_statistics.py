@@ -29,56 +29,17 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-# -------------------------------------------------------------------------------------- Student, F, chi2
-
-
-@pytest.mark.parametrize(
-    ("probability", "printed"), [(0.5, 0.0), (0.90, 1.2816), (0.975, 1.9600), (0.995, 2.5758), (0.9995, 3.2905)]
-)
-def test_printed_quantiles_of_the_normal_distribution(probability: float, printed: float) -> None:
-    assert normal_quantile(probability) == pytest.approx(printed, abs=0.0000501)
-    assert normal_quantile(1 - probability) == pytest.approx(-printed, abs=0.0000501)
-
-
-@pytest.mark.parametrize(
-    ("probability", "dof", "printed"),
-    [
-        (0.95, 1, 6.314),
-        (0.995, 1, 63.657),
-        (0.975, 4, 2.776),
-        (0.975, 10, 2.228),
-        (0.99, 7, 2.998),
-        (0.995, 30, 2.750),
-        (0.9995, 120, 3.373),
-    ],
-)
-def test_printed_quantiles_of_t(probability: float, dof: int, printed: float) -> None:
-    assert t_quantile(probability, dof) == pytest.approx(printed, abs=0.0005)
-    assert t_p_value(printed, dof) == pytest.approx(2 * (1 - probability), rel=0.002)
-
-
-@pytest.mark.parametrize(
-    ("probability", "dof", "printed"),
-    [
-        (0.95, 1, 3.841),
-        (0.95, 10, 18.307),
-        (0.99, 5, 15.086),
-        (0.999, 7, 24.322),
-        (0.999, 11, 31.264),
-        (0.05, 20, 10.851),
-        (0.5, 4, 3.357),
-    ],
-)
-def test_printed_quantiles_of_chi_square(probability: float, dof: int, printed: float) -> None:
-    assert chi2_quantile(probability, dof) == pytest.approx(printed, abs=0.0006)
-
-
-@pytest.mark.parametrize(
-    ("upper", "dof", "printed"),
-    [(0.05, (3, 10), 3.708), (0.05, (1, 4), 7.709), (0.01, (5, 12), 5.064), (0.05, (12, 15), 2.475)],
-)
-def test_printed_points_of_f(upper: float, dof: tuple[int, int], printed: float) -> None:
-    assert f_p_value(printed, *dof) == pytest.approx(upper, rel=0.002)
+def test_printed_quantiles() -> None:
+    """Normal, Student's, chi-square and F distributions, each at both tails and few and many degrees of freedom."""
+    assert [normal_quantile(p) for p in (0.5, 0.975, 0.9995)] == pytest.approx([0.0, 1.96, 3.2905], abs=0.0000501)
+    assert normal_quantile(0.025) == pytest.approx(-1.96, abs=0.0000501)
+    for probability, dof, printed in [(0.95, 1, 6.314), (0.975, 10, 2.228), (0.9995, 120, 3.373)]:
+        assert t_quantile(probability, dof) == pytest.approx(printed, abs=0.0005)
+        assert t_p_value(printed, dof) == pytest.approx(2 * (1 - probability), rel=0.002)
+    for probability, dof, printed in [(0.95, 1, 3.841), (0.999, 11, 31.264), (0.05, 20, 10.851)]:
+        assert chi2_quantile(probability, dof) == pytest.approx(printed, abs=0.0006)
+    for upper, dofs, printed in [(0.05, (3, 10), 3.708), (0.01, (5, 12), 5.064), (0.05, (12, 15), 2.475)]:
+        assert f_p_value(printed, *dofs) == pytest.approx(upper, rel=0.002)
 
 
 # ----------------------------------------------------------------------------------------- Grubbs and tau

@@ -16,21 +16,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photostrip import steps
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.measured.steps import read_rays, read_step
+from photostrip.formats.steps import read_rays, read_step
+from photostrip.geodesy.ground_frame import WGS84
+from photostrip.geodesy.local_frame import geodetic_from_geocentric
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
-from photostrip.library import steps
-from photostrip.library.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
+from photostrip.planning.closed_form import ORDER
+from photostrip.planning.deformation import DEFORMATION_TERMS, paraboloid_rows
 from photostrip.project import plans as keys
+from photostrip.project.conversion import semi_axes
 from photostrip.project.reading import read_keys
 from photostrip.project.sections import Section
 from photostrip.report.page.parts import DASH, Facts
+from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
-from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
+from photostrip.sheets.sheet import Rows, Sheet, by_columns
+from photostrip.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
-from photostrip.strip.formed_strip import lies_across
+from photostrip.strip.formed_strip import base_angles, base_frames, lies_across
 from photostrip.strip.polynomial import term_columns as design_columns
 from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.strip.resection import KnownPhotos, approximate, project, resect
@@ -42,20 +48,7 @@ Value = tuple[str, float, str, float | None, bool]  # name, number, unit, standa
 MILLION = 1e6
 TRACE = "trace_"  # before the keys of tables of a trace
 DIGITS = 10  # of values: more than any measurement has
-SYSTEM = "omega-phi-kappa"
-TITLES = {
-    "interior": "Interior orientation",
-    "refine": "Refined image coordinates",
-    "relative": "Relative orientation",
-    "intersection": "Space intersection",
-    "chain": "Orientation handed on along a strip",
-    "scale": "Scale transfer",
-    "strip": "Strip in model coordinates",
-    "absolute": "Absolute orientation",
-    "polynomial": "Polynomial",
-    "resection": "Space resection",
-    "bundle": "Bundle adjustment",
-}
+TEXTBOOK = "alpha-omega-kappa"  # system of the angles of [001]
 
 _COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
 _EXCHANGED = str.maketrans("XxYy", "YyXx")  # where the base lies along Y
@@ -64,11 +57,11 @@ _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
 
 def step(name: StepName, file: str, assignments: Sequence[str], *, trace: bool = False) -> Sheet:
     """Compute a step from its table, with the equations and their numbers if a trace is wanted."""
-    kind, computed = _STEPS[name]
+    title, kind, computed = _STEPS[name]
     given: Any = read_keys(kind, None, assignments)[0]
     sheet = computed(file, given)
     shown = [each for each in sheet.tables if trace or not each.key.startswith(TRACE)]
-    return replace(sheet, title=TITLES[name], tables=shown)
+    return replace(sheet, title=title, tables=shown)
 
 
 def _interior(file: str, given: keys.InteriorKeys) -> Sheet:
@@ -115,7 +108,8 @@ def _relative(file: str, given: keys.RelativeKeys) -> Sheet:
     degrees = zip(ELEMENTS, np.degrees(found.elements), np.degrees(found.sigmas), strict=True)
     values = [_value(name, value, "deg", sigma) for name, value, sigma in degrees]
     values += [_value(name, base * each, unit) for name, each in zip(("bx", "by", "bz"), found.base, strict=True)]
-    values += _angles(found.rotation)
+    tau, nu = np.degrees(base_angles(found.base)).tolist()
+    values += [_value("tau", tau, "deg"), _value("nu", nu, "deg"), *_angles(found.rotation, given.angles)]
     values += _fit(found.sigma0 * MICROMETRES, "um", len(ids) - len(ELEMENTS))
     listed: list[Column] = [(Field("q", "um 2"), found.parallax * MICROMETRES)]
     listed += columns("x y z", f"{unit} 4", found.model)
@@ -135,6 +129,12 @@ def _relative(file: str, given: keys.RelativeKeys) -> Sheet:
         _table("Elements before each step", _numbers(squares), [*squares, *before], "eq. 131-137"),
         _table("What the step adds", _numbers(squares), changes, "-(J'J)^-1 J'q, J the derivatives of q"),
         _matrices("Rotations to the base frame, by rows", ("left", "right"), np.stack(rotations)),
+        _matrices(
+            "A_taunu, base frame to left photo, by rows",
+            ("A_taunu",),
+            base_frames(np.eye(3)[None], found.elements[None]),
+            "A_taunu = A(al1, om1, ka1) A(al1', 0, ka1')', the left photo not turned; eq. 128; first column: the base",
+        ),
         _table("Points: photos turned into the base frame, and the model", ids, rays, _TURNED, words),
     )
 
@@ -143,7 +143,7 @@ def _intersection(file: str, given: keys.IntersectionKeys) -> Sheet:
     ids, images = read_step(file, "intersection")
     one, other = images
     focal, base, form = given.principal_distance, np.array(given.base), f"{given.unit} 4"
-    turned = _turned(given.left), _turned(given.right)
+    turned = _turned(given.left, given.angles), _turned(given.right, given.angles)
     found = steps.intersection(one, other, focal, base=base, rotations=turned, left_ray=given.left_ray)
     words = [
         f"N = (BX + x2h BZ/f) / (x1h - x2h), N2 = N + BZ/f, B = {', '.join(f'{each:g}' for each in base)}; eq. 138",
@@ -157,23 +157,26 @@ def _intersection(file: str, given: keys.IntersectionKeys) -> Sheet:
     return _sheet("intersection", [], ids, listed, matrices, trace)
 
 
-def _chain(file: str, _given: keys.StepKeys) -> Sheet:
-    ids, (degrees,) = read_step(file, "chain")
-    rotations = np.array([_turned(each) for each in degrees.tolist()])
+def _chain(file: str, given: keys.TurnedKeys) -> Sheet:
+    ids, (degrees,) = read_step(file, "chain", (tuple(given.angles.split("-")),))
+    rotations = np.array([_turned(each, given.angles) for each in degrees.tolist()])
     handed = steps.chain(rotations[1:], rotations[0])
-    given = _matrices("Given: each photo in the photo before it, by rows", ids, rotations)
+    taken = _matrices("Given: each photo in the photo before it, by rows", ids, rotations)
     found = _matrices("In the strip, by rows", ids, handed, "A(i+1) = A(i) A(i, i+1); eq. 131-134")
-    return _sheet("chain", [], ids, _turns(handed), given, found, of="photo")
+    return _sheet("chain", [], ids, _turns(handed, given.angles), taken, found, of="photo")
 
 
 def _scale(file: str, _given: keys.StepKeys) -> Sheet:
     """Return the factor of the second model, and what each point departs from it, in parts of a million."""
-    ids, (first, second) = read_step(file, "scale")
-    factor, departures = steps.scale_transfer(first, second)
+    ids, (first, second, weights) = read_step(file, "scale")
+    factor, departures = steps.scale_transfer(first, second, weights)
     values = [_value("k", factor), _value("rms departure", float(np.sqrt((departures**2).mean())) * MILLION, "ppm")]
     before, after = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
     rows: list[Column] = [(Field("D", " 6"), before), (Field("D'", " 6"), after), (Field("k_t", " 7"), before / after)]
-    words = f"k_t = D / D' from the common perspective centre; k = {factor:.9g}, their mean; eq. 139-141"
+    if np.ptp(weights):
+        rows.append((Field("weight", " g6"), weights))
+    mean = "weighted mean" if np.ptp(weights) else "mean"
+    words = f"k_t = D / D' from the common perspective centre; k = {factor:.9g}, their {mean}; eq. 139-141"
     listed: list[Column] = [(Field("departure", "ppm 1"), departures * MILLION)]
     return _sheet("scale", values, ids, listed, _table("Points", ids, rows, words))
 
@@ -197,19 +200,20 @@ def _strip(file: str, given: keys.StripKeys) -> Sheet:
         values,
         [points[n] for n in placed.tolist()],
         listed,
-        _photos(photos, found, given.unit),
+        _photos(photos, found, given.unit, given.angles),
         _table("Models", [f"{left} - {right}" for left, right in pairwise(photos)], rows, words),
         _matrices("Rotations A, photo to strip, by rows", photos, found.rotations),
     )
 
 
 def _absolute(file: str, given: keys.AbsoluteKeys) -> Sheet:
-    ids, (model, ground) = read_step(file, "absolute")
-    found, unit = steps.absolute(model, ground), given.unit
-    similarity, centre, place = found.similarity, model.mean(axis=0), ground.mean(axis=0)
+    ids, (model, ground, weights) = read_step(file, "absolute")
+    found, unit = steps.absolute(model, ground, weights), given.unit
+    similarity = found.similarity
+    centre, place = (np.average(each, axis=0, weights=weights) for each in (model, ground))
     values = [_value("scale", similarity.scale)]
     values += [_value(f"shift {axis}", each, unit) for axis, each in zip("xyz", similarity.shift, strict=True)]
-    values += _angles(similarity.rotation)
+    values += _angles(similarity.rotation, given.angles, ("xi", "eta", "theta"))
     values += _fit(found.sigma0, unit, found.redundancy)
     reduced, wanted = model - centre, ground - place
     turned = similarity.scale * reduced @ similarity.rotation.T
@@ -248,7 +252,7 @@ def _resection(file: str, given: keys.ResectionKeys) -> Sheet:
     found = steps.resection(xy, ground, focal, sigma=given.sigma_um / 1000.0)
     sigma = np.sqrt(np.diag(found.covariance))
     values = [_value(axis, found.center[k], unit, sigma[k]) for k, axis in enumerate("xyz")]
-    values += _angles(found.rotation)
+    values += _angles(found.rotation, given.angles)
     values += _fit(found.sigma0, "", found.redundancy)
     photo = np.zeros(len(xy), np.intp)
     seen: list[tuple[float, Floats, Floats]] = []
@@ -312,30 +316,114 @@ def _bundle(file: str, given: keys.BundleKeys) -> Sheet:
         [*_fit(found.sigma0, "", found.redundancy), _value("iterations", found.iterations)],
         [points[n] for n in placed.tolist()],
         listed,
-        _photos(photos, found, unit),
+        _photos(photos, found, unit, given.angles),
         _table("Steps of all photos and points", _numbers(states), states, words, "A'PA dx = A'Pv"),
         _matrices("Rotations R, photo to ground, by rows", photos, found.rotations),
         _table("Rays", ids, images, _COLLINEAR),
     )
 
 
-_STEPS: dict[StepName, tuple[type[Section], Callable[[str, Any], Sheet]]] = {
-    "interior": (keys.InteriorKeys, _interior),
-    "refine": (keys.RefineKeys, _refine),
-    "relative": (keys.RelativeKeys, _relative),
-    "intersection": (keys.IntersectionKeys, _intersection),
-    "chain": (keys.StepKeys, _chain),
-    "scale": (keys.StepKeys, _scale),
-    "strip": (keys.StripKeys, _strip),
-    "absolute": (keys.AbsoluteKeys, _absolute),
-    "polynomial": (keys.PolynomialKeys, _polynomial),
-    "resection": (keys.ResectionKeys, _resection),
-    "bundle": (keys.BundleKeys, _bundle),
+def _frame(file: str, given: keys.FrameKeys) -> Sheet:
+    """Return points in the intermediate frame, its origin, and in the trace its axes and the way back."""
+    ids, (geodetic,) = read_step(file, "frame")
+    turned = np.column_stack([np.radians(geodetic[:, :2]), geodetic[:, 2]])
+    ellipsoid = semi_axes(given.ellipsoid) or WGS84
+    found = steps.frame(turned, azimuth=radians(given.azimuth), ellipsoid=ellipsoid)
+    frame = found.frame
+    values = [_value(f"origin {axis}", each, "m", whole=True) for axis, each in zip("XYZ", frame.origin, strict=True)]
+    values.append(_value("A0", given.azimuth, "deg"))
+    back = geodetic_from_geocentric(frame.cartesian_from_intermediate(found.points), ellipsoid)
+    rows = columns("X_G Y_G Z_G", "m 4", found.geocentric)
+    rows += [*columns("longitude latitude", "deg 9", np.degrees(back[:, :2])), (Field("height", "m 4"), back[:, 2])]
+    words = "X = M' (X_G - X_0), X_0 their mean; eq. 144; longitude, latitude, height: back by X_0 + M X, eq. 152"
+    return _sheet(
+        "frame",
+        values,
+        ids,
+        columns("X Y Z", "m 4", found.points),
+        _matrices("Axes M, geocentric, by rows", ("M",), frame.axes, "columns: X in the azimuth A0, Y, Z; eq. 143"),
+        _table("Points: geocentric, and back", ids, rows, words),
+    )
+
+
+def _curvature(file: str, given: keys.CurvatureKeys) -> Sheet:
+    ids, (xyz,) = read_step(file, "curvature")
+    radius = given.radius_of_strip
+    fall = steps.curvature(xyz, radius=radius)
+    distance = np.hypot(*(xyz[:, :2] - xyz[:, :2].mean(axis=0)).T)
+    listed: list[Column] = [(Field("D", "m 1"), distance), (Field("D2/2R", "m 4"), fall)]
+    listed += [(Field("reduced", "m 4"), xyz[:, 2] - fall), (Field("raised", "m 4"), xyz[:, 2] + fall)]
+    words = (
+        "D from the middle of the points; reduced: z of control before the strip; raised: z of results after; eq. 153"
+    )
+    return _sheet("curvature", [_value("R", radius, "m")], ids, listed, _equations(words))
+
+
+def _pair_scales(file: str, given: keys.PairScalesKeys) -> Sheet:
+    """Return distances of all pairs in both systems, the scale r, and what is left of the scale s by it."""
+    ids, (model, ground) = read_step(file, "pair-scales")
+    found = steps.pair_scales(model, ground)
+    values = [_value("r", found.mean)]
+    if len(ids) > 2:
+        values.append(_value("t", steps.absolute(model, ground).similarity.scale / found.mean))
+    names = [f"{ids[one]} - {ids[other]}" for one, other in zip(found.first, found.second, strict=True)]
+    listed: list[Column] = [(Field("D", " 4"), found.source), (Field("D_G", f"{given.unit} 4"), found.target)]
+    listed.append((Field("r", " g9"), found.target / found.source))
+    words = "r = sum of D_G over sum of D, eq. 147, 148; the scale of the absolute orientation is s = r t"
+    return _sheet("pair-scales", values, names, listed, _equations(words), of="pair")
+
+
+def _closed_form(file: str, given: keys.ClosedFormKeys) -> Sheet:
+    ids, (points,) = read_step(file, "closed-form")
+    _, (control,) = read_step(str(given.control), "closed-form")
+    found = steps.closed_form(points, control, given.principal_distance, given.base, as_printed=given.as_printed)
+    values = [_value(f"c{number}", each, whole=True) for number, each in enumerate(found.sums.tolist(), 1)]
+    listed = columns(" ".join(ORDER), "ratio g7", found.coefficients.reshape(-1, len(ORDER)))
+    names = [f"{point} {axis}" for point in ids for axis in "xyz"]
+    words = "Error of a point per error of an element, less what the control takes back, mm/mm, mm/rad; eq. 9, 10, 11"
+    return _sheet("closed-form", values, names, listed, _equations(words), of="error of")
+
+
+def _deformation(file: str, given: keys.DeformationKeys) -> Sheet:
+    """Return the coefficients of the surface, t of twist and bending, the elements behind them, and what is left."""
+    ids, (xy, dz) = read_step(file, "deformation")
+    heights = dz[:, 0]
+    found = steps.deformation(xy, heights, sigma=given.sigma)
+    named = zip(DEFORMATION_TERMS, found.coefficients, found.sigmas, strict=True)
+    values = [_value(term, value, "", sigma, whole=True) for term, value, sigma in named]
+    t = zip(("t of C", "t of D"), found.t_values.tolist(), strict=True)
+    values += [*(_value(name, value) for name, value in t), _value("critical t, 5 %", found.critical())]
+    values += _fit(found.sigma0 * given.sigma, "m", found.redundancy)
+    turns = np.degrees(found.elements(given.scale / 1000, given.base)).tolist()  # dz in metres, the base in mm
+    values += [_value(name, each, "deg") for name, each in zip(("domega2'", "dalpha2' - dalpha1'"), turns, strict=True)]
+    surface = paraboloid_rows(xy) @ found.coefficients
+    listed = columns("dz surface v", "m 4", np.column_stack([heights, surface, heights - surface]))
+    words = "surface = E0 + A x + B y + C x y + D x^2; domega2' = -C b/m, dalpha2' - dalpha1' = -D b/m; eq. 10.12"
+    return _sheet("deformation", values, ids, listed, _equations(words))
+
+
+_STEPS: dict[StepName, tuple[str, type[Section], Callable[[str, Any], Sheet]]] = {
+    "interior": ("Interior orientation", keys.InteriorKeys, _interior),
+    "refine": ("Refined image coordinates", keys.RefineKeys, _refine),
+    "relative": ("Relative orientation", keys.RelativeKeys, _relative),
+    "intersection": ("Space intersection", keys.IntersectionKeys, _intersection),
+    "chain": ("Orientation handed on along a strip", keys.TurnedKeys, _chain),
+    "scale": ("Scale transfer", keys.StepKeys, _scale),
+    "strip": ("Strip in model coordinates", keys.StripKeys, _strip),
+    "absolute": ("Absolute orientation", keys.AbsoluteKeys, _absolute),
+    "polynomial": ("Polynomial", keys.PolynomialKeys, _polynomial),
+    "resection": ("Space resection", keys.ResectionKeys, _resection),
+    "bundle": ("Bundle adjustment", keys.BundleKeys, _bundle),
+    "frame": ("Intermediate frame", keys.FrameKeys, _frame),
+    "curvature": ("Earth curvature", keys.CurvatureKeys, _curvature),
+    "pair-scales": ("Scales of pairs of points", keys.PairScalesKeys, _pair_scales),
+    "closed-form": ("Errors of points in closed form", keys.ClosedFormKeys, _closed_form),
+    "deformation": ("Deformation of a model", keys.DeformationKeys, _deformation),
 }
 
 
-def _turned(degrees: Sequence[float]) -> Floats:
-    return from_angles([radians(each) for each in degrees], SYSTEM)
+def _turned(degrees: Sequence[float], system: str) -> Floats:
+    return from_angles([radians(each) for each in degrees], system)
 
 
 def _rays(file: str) -> tuple[tuple[str, ...], tuple[str, ...], Rays]:
@@ -353,23 +441,23 @@ def _fit(sigma0: float, unit: str, redundancy: int) -> list[Value]:
     return [_value("sigma0", sigma0, unit), _value("redundancy", redundancy)]
 
 
-def _angles(rotation: Floats) -> list[Value]:
-    turned = np.degrees(angles(rotation, SYSTEM))
-    return [_value(name, value, "deg") for name, value in zip(SYSTEM.split("-"), turned, strict=True)]
+def _angles(rotation: Floats, system: str, textbook: tuple[str, ...] = ()) -> list[Value]:
+    """Return the angles of a rotation; `textbook`: their names in the system of the source."""
+    names = textbook if textbook and system == TEXTBOOK else system.split("-")
+    return [_value(name, value, "deg") for name, value in zip(names, np.degrees(angles(rotation, system)), strict=True)]
 
 
 def _image_residuals(residuals: Floats) -> list[Column]:
     return columns("vx vy", "um 2", residuals * MICROMETRES)
 
 
-def _turns(rotations: Floats) -> list[Column]:
-    turned = np.degrees(np.array([angles(each, SYSTEM) for each in rotations]))
-    return columns(SYSTEM.replace("-", " "), "deg 6", turned)
+def _turns(rotations: Floats, system: str) -> list[Column]:
+    return columns(system.replace("-", " "), "deg 6", np.degrees(angles(rotations, system)))
 
 
-def _photos(photos: Sequence[str], found: Strip | Bundle, unit: str) -> Rows:
+def _photos(photos: Sequence[str], found: Strip | Bundle, unit: str, system: str) -> Rows:
     return _rows(
-        "photos", "", photos, [*columns("x y z", f"{unit} 4", found.centers), *_turns(found.rotations)], "photo"
+        "photos", "", photos, [*columns("x y z", f"{unit} 4", found.centers), *_turns(found.rotations, system)], "photo"
     )
 
 
@@ -458,6 +546,10 @@ def _matrices(title: str, ids: Sequence[str], rotations: Floats, *words: str) ->
 
 def _numbers(steps: Sequence[Column]) -> list[str]:
     return [str(number) for number in range(1, len(np.asarray(steps[0][1])) + 1)]
+
+
+def _equations(*words: str) -> Rows:
+    return Rows(f"{TRACE}equations", "Equations", (), (), above=words)
 
 
 def _table(title: str, ids: Iterable[str], listed: Sequence[Column], *words: str) -> Rows:

@@ -14,11 +14,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.network.adjustment import BundleSolution, solve
 from photostrip.network.problem import BundleCameras, BundleProblem, ImageObservations, StartValues
 from photostrip.network.reliability import joint_cofactors
-from photostrip.pipeline.inputs import (
-    ModelStrip,
-    Settings,
-    rows_of_models,
-)
+from photostrip.pipeline.inputs import ModelStrip, Settings, rows_of_models
 from photostrip.points import ModelPoints, locate, take_rows
 from photostrip.strip import absolute_orientation, linked_models
 from photostrip.strip.linked_models import (

@@ -39,12 +39,7 @@ from photostrip.pipeline.inputs import (
 from photostrip.pipeline.results import PlacedModels, StripResult
 from photostrip.plausibility.given_points import find_shared
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.strip import (
-    absolute_orientation,
-    fitted_strip,
-    linked_models,
-    polynomial,
-)
+from photostrip.strip import absolute_orientation, fitted_strip, linked_models, polynomial
 from photostrip.strip.control_screening import (
     EITHER,
     WRONG_IMAGE,

@@ -13,11 +13,7 @@ from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
-from photostrip.strip.control_screening import (
-    EITHER,
-    EXCHANGED,
-    ScreenedControl,
-)
+from photostrip.strip.control_screening import EITHER, EXCHANGED, ScreenedControl
 from photostrip.strip.formed_strip import FormedStrip
 from photostrip.strip.linked_models import LEFT, FormedModels, far_ends
 from photostrip.strip.pair_screening import ScreenedPairs

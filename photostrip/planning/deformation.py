@@ -32,6 +32,7 @@ from photostrip.planning.single_model import (
     measured_covariance,
     orientation_operator,
     orientation_parameters,
+    parallaxes,
 )
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.strip import relative_orientation
@@ -322,7 +323,9 @@ class BentModel:
     """The surface into which errors of the elements bend a model."""
 
     surface: Floats  # (5,): E0, A, B, C, D of the heights, for x and y in mm at photo scale
-    c: Floats  # (q,): what the elements add to the x parallax, eq. 10.9, mm
+    # (q,): what the elements add to the x parallax, eq. 10.9, and the y parallax that they leave, mm
+    c: Floats
+    parallax: Floats
     raised: Floats  # (q, 3): errors of points in the base frame, eq. 10.8: plan by the left ray, heights by the surface
     left: Floats  # (q, 3): what the absolute orientation leaves of the errors
 
@@ -337,6 +340,7 @@ def bend_model(points: Floats, control: ModelControl, base: float, focal: float,
     return BentModel(
         surface=surface_of_elements(turned, 1.0, focal, base),
         c=c,
+        parallax=parallaxes(points, base)[1] @ elements,
         raised=np.column_stack([xy / base * c[:, None], -focal / base * c]),
         left=parts.from_elements,
     )

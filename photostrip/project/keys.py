@@ -12,17 +12,19 @@ from pydantic import Discriminator, Tag
 
 from photostrip import camera
 from photostrip.errors import Fault, InputError
-from photostrip.formats.measured.control import CONTROL
-from photostrip.formats.measured.exterior import POSITIONS, ROTATIONS, orientation_columns
-from photostrip.formats.measured.models import MODEL_CENTERS, MODEL_POINTS
-from photostrip.formats.measured.observations import FIDUCIALS, OBSERVATIONS
-from photostrip.formats.measured.pairs import LAYOUTS
-from photostrip.formats.measured.repeated import POLICIES
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import shown
-from photostrip.formats.text.table_reader import WORDS
-from photostrip.formats.text.table_text import MOST_LINES
-from photostrip.formats.text.tables import Column
+from photostrip.formats.faults import shown, suggestion
+from photostrip.formats.measured import (
+    CONTROL,
+    FIDUCIALS,
+    LAYOUTS,
+    OBSERVATIONS,
+    POLICIES,
+    POSITIONS,
+    ROTATIONS,
+    orientation_columns,
+)
+from photostrip.formats.models import MODEL_CENTERS, MODEL_POINTS
+from photostrip.formats.tables import MOST_LINES, WORDS, Column
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.network.problem import ASKED, SCREENINGS, TESTS
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
@@ -44,13 +46,13 @@ from photostrip.project.sections import (
     PositiveOrAuto,
     Range,
     Read,
+    SchemaNumber,
     Section,
     Sigma3,
     Text,
     Triple,
     Words,
     YAxis,
-    bounded,
     choice,
     if_empty,
     key,
@@ -59,7 +61,6 @@ from photostrip.project.sections import (
     quoted,
     read_positive,
     rule,
-    schema_number,
     single,
     text,
     whole,
@@ -125,13 +126,11 @@ class TableFile(Section):
     """How a table is written."""
 
     file: Files
-    separator: Annotated[str, choice(tuple(WORDS.values()))] = key(
+    separator: Annotated[str, choice(*WORDS.values())] = key(
         "What stands between the fields: `comma`, `semicolon`, `tab` or `blank` (any number of blanks and tabs)",
         "comma",
     )
-    decimal: Annotated[str, choice(("point", "comma"))] = key(
-        "What stands before decimals: `point` or `comma`", "point"
-    )
+    decimal: Annotated[str, choice("point", "comma")] = key("What stands before decimals: `point` or `comma`", "point")
     skip: Annotated[int, Read(_lines_skipped, {"type": "integer", "minimum": 0})] = key(
         "Lines above the table that are passed over", 0
     )
@@ -143,8 +142,8 @@ class TableFile(Section):
             raise wrong(message, at="decimal", fix="say the `separator`: semicolon, tab or blank")
 
 
-Unit = Annotated[str, choice(("mm", "um", "0.1um", "px"))]
-Repeated = Annotated[str, choice(POLICIES)]
+Unit = Annotated[str, choice("mm", "um", "0.1um", "px")]
+Repeated = Annotated[str, choice(*POLICIES)]
 Columns = Annotated[dict[str, Words], Before(if_empty)]
 PointColumns = Annotated[Columns, header_names(OBSERVATIONS, *LAYOUTS)]
 MarkColumns = Annotated[Columns, header_names(FIDUCIALS)]
@@ -167,7 +166,7 @@ class Observations(TableFile):
     y_axis: YAxis | None = key(
         "Direction of y, `up` or `down`; x grows to the right. Default: `up`; required for px", None
     )
-    origin: Annotated[str, choice(("center", "top-left", "first-pixel"))] | None = key(
+    origin: Annotated[str, choice("center", "top-left", "first-pixel")] | None = key(
         "Where x = y = 0: `center` of the photo, `top-left` corner of the first pixel, `first-pixel`: its centre."
         " Default: `center`; for px `top-left`. Meaningless with measured fiducial marks",
         None,
@@ -192,8 +191,8 @@ class Models(TableFile):
     file: Words = key(
         "Table `model,point,x,y,z[,sx,sy,sz]`, .csv or .csv.gz; a point with the id of a photo is its centre"
     )
-    unit: Annotated[str, choice(("mm", "um", "m"))] = key("Unit of the tables: `mm`, `um` or `m`, at model scale")
-    axes: Annotated[str, choice(("right-handed", "left-handed"))] = key(
+    unit: Annotated[str, choice("mm", "um", "m")] = key("Unit of the tables: `mm`, `um` or `m`, at model scale")
+    axes: Annotated[str, choice("right-handed", "left-handed")] = key(
         "Whether x, y, z of the plotter are `right-handed` or `left-handed`", "right-handed"
     )
     centers: ModelCenters | None = key("Perspective centres, when they stand in a table of their own", None)
@@ -287,12 +286,12 @@ class CameraPositions(GivenList):
         (0.0, 0.0, 0.0),
         unit="m",
     )
-    correction: Annotated[str, choice(("none", "offset", "drift"))] = key(
+    correction: Annotated[str, choice("none", "offset", "drift")] = key(
         "Unknown error that the positions of one strip share: `none`, `offset` (constant) or `drift` (constant and"
         " linear in `time`; without times in the number of the photo)",
         "none",
     )
-    group: Annotated[str, choice(("strip", "block"))] = key(
+    group: Annotated[str, choice("strip", "block")] = key(
         "What has one `correction` in common: each `strip`, or the whole `block`", "strip"
     )
 
@@ -300,29 +299,29 @@ class CameraPositions(GivenList):
 class Angles(Section):
     """Angles of the exterior orientations."""
 
-    system: Annotated[str, choice(SYSTEMS)] = key(
+    system: Annotated[str, choice(*SYSTEMS)] = key(
         "`alpha-omega-kappa`, `omega-phi-kappa`, `phi-omega-kappa` or `yaw-pitch-roll`", USUAL.angle_system
     )
-    unit: Annotated[str, choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
+    unit: Annotated[str, choice("deg", "gon", "rad")] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
 
 
 class GivenAngles(Section):
     """Angles, quaternions or matrices of given orientations."""
 
-    system: Annotated[str, choice((*SYSTEMS, *ROTATIONS))] = key(
+    system: Annotated[str, choice(*SYSTEMS, *ROTATIONS)] = key(
         "`alpha-omega-kappa`, `omega-phi-kappa`, `phi-omega-kappa`, `yaw-pitch-roll`, `quaternion` (columns qw, qx, qy,"
         " qz) or `matrix` (r11, r12, ... r33)",
         USUAL.angle_system,
     )
-    unit: Annotated[str, choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
-    north: Annotated[str, choice(("grid", "true"))] = key(
+    unit: Annotated[str, choice("deg", "gon", "rad")] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
+    north: Annotated[str, choice("grid", "true")] = key(
         "North that they count from: `grid`, or `true`: then the meridian convergence at each photo is applied", "grid"
     )
-    looks: Annotated[str, choice(("down", "ahead"))] | None = key(
+    looks: Annotated[str, choice("down", "ahead")] | None = key(
         "Of yaw-pitch-roll, required: where the camera looks with pitch and roll zero, `down` or `ahead` (a gimbal)",
         None,
     )
-    rotates: Annotated[str, choice(("image_to_ground", "ground_to_image"))] | None = key(
+    rotates: Annotated[str, choice("image_to_ground", "ground_to_image")] | None = key(
         "Of quaternions and matrices, required: `image_to_ground` or `ground_to_image`", None
     )
     y_axis: YAxis | None = key(
@@ -351,7 +350,7 @@ class Orientations(GivenList):
     )
     columns: OrientationColumns = key(COLUMNS, {})
     angles: GivenAngles = key("System and unit of the angles", GivenAngles())
-    role: Annotated[str, choice(("observed", "approximate"))] = key(
+    role: Annotated[str, choice("observed", "approximate")] = key(
         "`observed`: observations with their standard deviations; `approximate`: a start, without influence", "observed"
     )
     sigma: Sigma3 | None = key(SIGMA, None, unit="m")
@@ -385,8 +384,8 @@ class Output(Section):
     angles: Angles = key("Angles of the exterior orientations", Angles())
 
 
-Place = Annotated[str, choice(tuple(PLACES))]
-Parameter = Annotated[str, choice(ASKED)]
+Place = Annotated[str, choice(*PLACES)]
+Parameter = Annotated[str, choice(*ASKED)]
 AUTO, NEVER = "auto", "never"
 MILLIMETRES, PIXELS = "mm", "px"
 
@@ -409,8 +408,8 @@ SelfCalibration = Annotated[
 class Distortion(Section):
     """Lens distortion of a camera."""
 
-    model: Annotated[str, choice(("brown", "radial-table"))] = key("`brown` or `radial-table`")
-    direction: Annotated[str, choice(("image_to_ideal", "ideal_to_image"))] = key(
+    model: Annotated[str, choice("brown", "radial-table")] = key("`brown` or `radial-table`")
+    direction: Annotated[str, choice("image_to_ideal", "ideal_to_image")] = key(
         "`image_to_ideal`: ideal = image + D(image); `ideal_to_image`: image = ideal + D(ideal)"
     )
     k: tuple[Number, Number, Number] = key(
@@ -463,8 +462,8 @@ Focal = Annotated[
 class PixelCamera(Section):
     """One camera as a program that counts in pixels gives it."""
 
-    unit: Annotated[str, choice((PIXELS,))] = key("`px`: all of it is in pixels, as its convention counts")
-    convention: Annotated[str, choice(tuple(CONVENTIONS))] = key(
+    unit: Annotated[str, choice("px")] = key("`px`: all of it is in pixels, as its convention counts")
+    convention: Annotated[str, choice(*CONVENTIONS)] = key(
         f"Whose signs, names and origins these are: {quoted(tuple(CONVENTIONS))}"
     )
     image_size: tuple[Positive, Positive] = key("Width and height of the photo", unit="px")
@@ -504,7 +503,7 @@ class PixelCamera(Section):
 class Camera(Section):
     """One camera, in millimetres."""
 
-    unit: Annotated[str, choice((MILLIMETRES,))] | None = key("`mm`; `px` for a camera that is given in pixels", None)
+    unit: Annotated[str, choice("mm")] | None = key("`mm`; `px` for a camera that is given in pixels", None)
     principal_distance: Positive = key("Principal distance", unit="mm")
     principal_point: Pair = key("Principal point in the system of the image coordinates", (0.0, 0.0), unit="mm")
     format: tuple[Positive, Positive] | None = key("Width and height of the photo; needed for pixels", None, unit="mm")
@@ -577,7 +576,7 @@ class Photos(Section):
 class Relative(Section):
     """Relative orientation and its search for gross errors."""
 
-    screening: Annotated[str, choice(RELATIVE_SCREENINGS)] = key(
+    screening: Annotated[str, choice(*RELATIVE_SCREENINGS)] = key(
         f"How gross errors are searched for: {quoted(RELATIVE_SCREENINGS)}", USUAL.relative.screening
     )
     grubbs_alpha: Fraction = key(
@@ -595,7 +594,7 @@ class Relative(Section):
 class Links(Section):
     """Links of independent models and their search for gross errors."""
 
-    screening: Annotated[str, choice(LINK_METHODS)] = key(
+    screening: Annotated[str, choice(*LINK_METHODS)] = key(
         "How gross errors are searched for: `auto` (points of each link one after the other) or `none`",
         USUAL.links.screening,
     )
@@ -609,7 +608,7 @@ class Links(Section):
 class Polynomial(Section):
     """Polynomial adjustment of a strip."""
 
-    degree: Annotated[str, choice(DEGREES)] = key(
+    degree: Annotated[str, choice(*DEGREES)] = key(
         "`auto` (decided by evidence, which is printed), `1`, `2` or `3`", USUAL.polynomial.degree
     )
 
@@ -617,11 +616,11 @@ class Polynomial(Section):
 class Interior(Section):
     """Interior orientation by fiducial marks."""
 
-    transform: Annotated[str, choice(("auto", "conformal", "affine", "bilinear", "projective"))] = key(
+    transform: Annotated[str, choice("auto", "conformal", "affine", "bilinear", "projective")] = key(
         "`auto` (affine from four marks on, else conformal), `conformal`, `affine`, `bilinear` or `projective`",
         USUAL.interior.transform,
     )
-    residuals: Annotated[str, choice(("ignore", "interpolate"))] = key(
+    residuals: Annotated[str, choice("ignore", "interpolate")] = key(
         "What the residuals of the marks do: `ignore`, or `interpolate` them to the points",
         USUAL.interior.residuals,
     )
@@ -630,11 +629,11 @@ class Interior(Section):
 class Bundle(Section):
     """Bundle adjustment of all strips together."""
 
-    screening: Annotated[str, choice(SCREENINGS)] = key(
+    screening: Annotated[str, choice(*SCREENINGS)] = key(
         "How gross errors are searched for: `snooping` (one after the other), `robust` (re-weighted first) or `none`",
         USUAL.bundle.screening,
     )
-    test: Annotated[str, choice(TESTS)] = key(
+    test: Annotated[str, choice(*TESTS)] = key(
         "`tau`: residuals against the sigma0 found; `baarda`: against the stated standard deviations",
         USUAL.bundle.test,
     )
@@ -667,7 +666,7 @@ class Bundle(Section):
                 raise wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
 
 
-Latitude = Annotated[Number, After(bounded(Range(-90.0, 90.0, "deg")))]
+Latitude = Annotated[Number, Range(-90.0, 90.0, "deg")]
 
 
 class Processing(Section):
@@ -675,7 +674,7 @@ class Processing(Section):
 
     gone = {"covariance": "remove it: `adjustment: bundle` took its place, and needs none of it"}  # noqa: RUF012 (as above)
 
-    adjustment: Annotated[str, choice(ADJUSTMENTS)] = key(
+    adjustment: Annotated[str, choice(*ADJUSTMENTS)] = key(
         "`auto` (`bundle` wherever it is determined, the polynomials printed beside it; otherwise `polynomial`), "
         "`polynomial` (the strip method), `similarity` (without a polynomial) or `bundle` (all photos rigorously)",
         USUAL.adjustment,
@@ -690,7 +689,7 @@ class Processing(Section):
     bundle: Bundle = key("Bundle adjustment", Bundle())
     relative: Relative = key("Relative orientation", Relative())
     links: Links = key("Links of independent models", Links())
-    scale_transfer: Annotated[str, choice(SCALE_TRANSFERS)] = key(
+    scale_transfer: Annotated[str, choice(*SCALE_TRANSFERS)] = key(
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
         USUAL.formation.scale_transfer,
     )
@@ -699,16 +698,16 @@ class Processing(Section):
         " other does",
         {},
     )
-    intersection: Annotated[str, choice(INTERSECTIONS)] = key(
+    intersection: Annotated[str, choice(*INTERSECTIONS)] = key(
         "`mean`: Y of a model point is the mean of both rays; `left`: the point lies on the left ray, as printed",
         USUAL.formation.intersection,
     )
-    control_weights: Annotated[str, choice(("stated", "equal"))] = key(
+    control_weights: Annotated[str, choice("stated", "equal")] = key(
         "`stated`: control weighs by its standard deviations and those of the strip's points; `equal`: each coordinate"
         " alike, as printed",
         USUAL.absolute.control_weights,
     )
-    earth_curvature: Annotated[str, choice(("auto", "model", "image", "none"))] = key(
+    earth_curvature: Annotated[str, choice("auto", "model", "image", "none")] = key(
         "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"
         " coordinates of an unknown projection given as `local`; `image`: the same, photo by photo in the image",
         USUAL.absolute.earth_curvature,
@@ -765,7 +764,7 @@ ENDINGS = {
 }
 ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
-TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined", "reliability", "links")  # of a run
+TABLES = ("points", "photos", "residuals", "rejected", "refined", "reliability", "links")  # of a run
 
 
 def form_of(target: str, asked: str = "") -> str:
@@ -846,7 +845,7 @@ class ProjectFile(Section):
     All paths are relative to the file itself. All ids are text, quoted or not.
     """
 
-    photostrip: Annotated[int, schema_number("photostrip")] = key("Number of this schema")
+    photostrip: SchemaNumber = key("Number of this schema")
     name: Words | None = key("Name of the project; default: the file's name without its ending", None)
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     cameras: Annotated[dict[str, AnyCamera], length(1), Before(if_empty)] = key(

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Annotated, NamedTuple
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
 from photostrip.camera import Camera
 from photostrip.errors import InputError
-from photostrip.formats.text.findings import suggestion
+from photostrip.formats.faults import LARGEST_NUMBER, suggestion
+from photostrip.geodesy.ground_frame import WGS84
+from photostrip.geodesy.local_frame import EARTH_RADIUS, radius_in_azimuth
 from photostrip.planning import camera_efficiency
+from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, HighGround
 from photostrip.planning.ideal_strip import BUNDLE, LEAST_PHOTOS, METHODS, USES, ControlLayout, Spot, StripGeometry
 from photostrip.planning.ideal_strip import LAYOUTS as STRIP_LAYOUTS
 from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
-from photostrip.planning.strip_design import Demand, DesignReport, DesignTask, Placement, plan_strip
+from photostrip.planning.strip_design import Demand, DesignTask, Placement
 from photostrip.project.conversion import distortion_of
-from photostrip.project.keys import Distortion
-from photostrip.project.reading import Reading, read_keys, valid_section
+from photostrip.project.keys import Distortion, Ellipsoid
+from photostrip.project.reading import Reading
 from photostrip.project.sections import (
     After,
     Before,
-    FirstSchema,
     Flag,
     Fraction,
     Id,
@@ -33,31 +33,37 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    SchemaNumber,
     Section,
     Triple,
     Whole,
     Words,
-    bounded,
     choice,
     key,
     length,
-    one_of,
     rule,
     wrong,
 )
 from photostrip.project.simulation import SimulatedCamera, camera_of
 from photostrip.project.terrestrial import BASE, DISTANCE, IMAGE_SIGMA_UM, SIGNIFICANCE, CameraOrName, only_camera
 from photostrip.project.terrestrial import Camera as Phototheodolite
-from photostrip.simulation import Points
 from photostrip.strip.polynomial import POWERS
 from photostrip.strip.relative_orientation import SCREENINGS
 from photostrip.terrestrial.accuracy import DisplacementSpec
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
-OVERLAP = Range(1.0, 99.0, "%")
-
-Percent = Annotated[Positive, After(bounded(OVERLAP))]
-SigmaUm = Annotated[Positive, After(bounded(IMAGE_SIGMA_UM))]
+Percent = Annotated[Positive, Range(1.0, 99.0, "%")]
+SigmaUm = Annotated[Positive, IMAGE_SIGMA_UM]
+USUAL_POINTS, USUAL_LAYOUT, USUAL_SCREENING = StripGeometry.points, ControlLayout(""), ScreeningSpec()
+USUAL_PAIR = USUAL_SCREENING.layout
+RELIEF = 0.9  # of the flying height: what stands higher is no ground
+PLACE = "x along the base and y to the left on the ground, from the left nadir, at photo scale"
+# Keys of a simulation by which the strip is refused, and those of the plan.
+SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
+DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
+FLIGHTS = ("scale", "flying_height", "height_sigma")
+STEP_ANGLES = ("omega-phi-kappa", "alpha-omega-kappa")
+PRESET = "UMK 10/1318"
 
 
 def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -70,10 +76,20 @@ def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float
 Sigmas = Annotated[Triple, After(all_positive)]
 
 
-class Flown(Section):
-    """A plan of something that is flown: camera, overlap, scale, measuring."""
+def at(value: object) -> object:
+    """Let a place stand for a point that is given in full."""
+    return {"at": value} if isinstance(value, list) else value
+
+
+class PlanFile(Section):
+    """What all plans have."""
 
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+
+
+class Flown(PlanFile):
+    """A plan of something that is flown: camera, overlap, scale, measuring."""
+
     camera: SimulatedCamera = key("Camera; its lens counts as ideal", SimulatedCamera())
     end_lap_percent: Percent = key("Overlap of neighbouring photos", StripGeometry.end_lap_percent, unit="%")
     scale: Positive | None = key("Denominator of the photo scale; default: 10000", None)
@@ -91,12 +107,7 @@ class Flown(Section):
         return self.scale or by_height or StripGeometry.scale
 
 
-POINT_USES = ("xyz", "xy", "z")
-REACH = Range(5.0, 100.0, "%")
-GRID_POINTS = Range(2, 101, "points")
-ZONE_POINTS = Range(1, 1000, "points")
-RELIEF = 0.9  # of the flying height: what stands higher is no ground
-PLACE = "x along the base and y to the left on the ground, from the left nadir, at photo scale"
+Use = Annotated[str, choice(*USES)]
 
 
 class ModelPoint(Section):
@@ -112,7 +123,7 @@ class ModelControlPoint(ModelPoint):
     """One control point."""
 
     name: Id = key("Name; default: C and its number", "")
-    use: Annotated[Words, After(one_of(*POINT_USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    use: Use = key("`xyz`, `xy` or `z`", "xyz")
     misclosure: Triple | None = key("Model minus given, where it has been measured", None, unit="m")
     given_error: Triple = key("Error of the given coordinates", NO_ERROR, unit="m")
 
@@ -127,18 +138,11 @@ class ElementErrors(Section):
     domega_arcsec: Number = key("Turn, to look to the left", 0.0, unit="arcsec")
 
 
-def _control_point(value: object) -> object:
-    """Let a pair of numbers stand for a point that is given in full."""
-    return {"at": value} if isinstance(value, list) else value
-
-
 class ModelControl(Section):
     """The control of the model."""
 
-    layout: Annotated[Words, After(one_of(*LAYOUTS))] = key(
-        "`corners`, `corners+centre`, or `six` standard points", "corners"
-    )
-    points: list[Annotated[ModelControlPoint, Before(_control_point)]] = key(
+    layout: Annotated[str, choice(*LAYOUTS)] = key("`corners`, `corners+centre`, or `six` standard points", "corners")
+    points: list[Annotated[ModelControlPoint, Before(at)]] = key(
         "Points instead of a layout: [x, y], or {at: [x, y], use: z}", []
     )
     sigma: Sigmas = key("Standard deviations along, across and in height", ModelSpec.control_sigma, unit="m")
@@ -147,15 +151,15 @@ class ModelControl(Section):
 class ModelOrientation(Section):
     """The points that orient the pair."""
 
-    zone_points: Annotated[Whole, After(bounded(ZONE_POINTS))] = key("Points in each of six zones", 1)
+    zone_points: Annotated[Whole, Range(1, 1000, "points")] = key("Points in each of six zones", 1)
     points: list[Pair] = key("Points instead of zones: [x, y], from the left nadir", [], unit="mm")
 
 
 class Grid(Section):
     """Where errors are computed."""
 
-    columns: Annotated[Whole, After(bounded(GRID_POINTS))] = key("Points along the base", ModelSpec.grid[0])
-    rows: Annotated[Whole, After(bounded(GRID_POINTS))] = key("Points across the flight", ModelSpec.grid[1])
+    columns: Annotated[Whole, Range(2, 101, "points")] = key("Points along the base", ModelSpec.grid[0])
+    rows: Annotated[Whole, Range(2, 101, "points")] = key("Points across the flight", ModelSpec.grid[1])
 
 
 def _listed(value: object) -> object:
@@ -172,10 +176,10 @@ def _listed(value: object) -> object:
 class ModelPlanFile(Flown):
     """Expected errors over one model. Every key but the first has a default."""
 
-    photostrip_plan_model: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_model: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "model")
     base: Positive | None = key("Photo base, instead of the overlap", None, unit="mm")
-    reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
+    reach_percent: Annotated[Positive, Range(5.0, 100.0, "%")] = key(
         "Outermost points, of half the width of the photo", 80.0, unit="%"
     )
     orientation: ModelOrientation = key("Points that orient the pair", ModelOrientation())
@@ -185,7 +189,7 @@ class ModelPlanFile(Flown):
     element_errors: Annotated[ElementErrors, Before(_listed)] = key(
         "Given errors of the elements: by name, or [dby, dbz, dkappa, dalpha, domega]", ElementErrors()
     )
-    closed_form: Annotated[Words, After(one_of("no", "yes", "printed"))] = key(
+    closed_form: Annotated[str, choice("no", "yes", "printed")] = key(
         "Operators and closed form side by side, with c1 to c15; `printed`: as the source prints it, misprints and all",
         "no",
     )
@@ -214,83 +218,43 @@ class ModelPlanFile(Flown):
                 message = f"a point {highest:g} m high is not seen from {flying_height:g} m"
                 raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
 
-
-class ModelPlan(NamedTuple):
-    name: str
-    camera: str
-    spec: ModelSpec
-    closed_form: str  # ``no``, ``yes`` or ``printed``
-    files: Sequence[str]
-
-
-def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
-    """Read the plan of a model, or raise all its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_keys(ModelPlanFile, path, assignments)
-    camera = camera_of(given.camera)
-    along, across = camera.format or (230.0, 230.0)
-    base = given.base or along * (1.0 - given.end_lap_percent / 100.0)
-    width = across / 2.0 * given.reach_percent / 100.0
-    points = tuple(_control_of(point, number) for number, point in enumerate(given.control.points, 1))
-    scale = given.scale_of(camera)
-    spec = ModelSpec(
-        focal=camera.principal_distance,
-        base=base,
-        width=width,
-        scale=scale,
-        image_sigma=given.image_sigma_um / MICROMETRES,
-        zone_points=given.orientation.zone_points,
-        orientation_points=tuple(given.orientation.points),
-        control=points or control_layout(str(given.control.layout), base, width),
-        control_sigma=given.control.sigma,
-        grid=(given.grid.columns, given.grid.rows),
-        points=tuple(
-            NamedPoint(point.at, name=str(point.name), height=point.height, measured_error=point.measured_error)
-            for point in given.points
-        ),
-        element_errors=_element_errors(given.element_errors),
-    )
-    return ModelPlan(
-        name=str(given.name), camera=camera.name, spec=spec, closed_form=str(given.closed_form), files=reading.files
-    )
-
-
-def _control_of(point: ModelControlPoint, number: int) -> ControlPoint:
-    return ControlPoint(
-        at=point.at,
-        use=str(point.use),
-        name=str(point.name or f"C{number}"),
-        height=point.height,
-        misclosure=point.misclosure,
-        measured_error=point.measured_error,
-        given_error=point.given_error,
-    )
-
-
-def _element_errors(given: ElementErrors) -> tuple[float, ...]:
-    lengths = (given.dby_um / MICROMETRES, given.dbz_um / MICROMETRES)
-    angles = (given.dkappa_arcsec, given.dalpha_arcsec, given.domega_arcsec)
-    return (*lengths, *(angle / ARCSECONDS for angle in angles))
-
-
-MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
-ROWS = Range(2, 20, "rows")
-EXTRA = Range(0, 200, "points")
-PLACED = Range(1, 40, "points")
-ROW_REACH = Range(5.0, 95.0, "%")
-USUAL_POINTS, USUAL_LAYOUT = StripGeometry.points, ControlLayout("")
-# Keys of a simulation by which the strip is refused, and those of the plan.
-SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
-DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
+    @property
+    def spec(self) -> ModelSpec:
+        camera, errors = camera_of(self.camera), self.element_errors
+        along, across = camera.format or (230.0, 230.0)
+        base = self.base or along * (1.0 - self.end_lap_percent / 100.0)
+        width = across / 2.0 * self.reach_percent / 100.0
+        named = ((point, point.name or f"C{number}") for number, point in enumerate(self.control.points, 1))
+        points = tuple(ControlPoint(**{**dict(point), "name": name}) for point, name in named)
+        angles = (errors.dkappa_arcsec, errors.dalpha_arcsec, errors.domega_arcsec)
+        return ModelSpec(
+            focal=camera.principal_distance,
+            base=base,
+            width=width,
+            scale=self.scale_of(camera),
+            image_sigma=self.image_sigma_um / MICROMETRES,
+            zone_points=self.orientation.zone_points,
+            orientation_points=tuple(self.orientation.points),
+            control=points or control_layout(self.control.layout, base, width),
+            control_sigma=self.control.sigma,
+            grid=(self.grid.columns, self.grid.rows),
+            points=tuple(NamedPoint(**dict(point)) for point in self.points),
+            element_errors=(
+                errors.dby_um / MICROMETRES,
+                errors.dbz_um / MICROMETRES,
+                *(each / ARCSECONDS for each in angles),
+            ),
+        )
 
 
 class StripPoints(Section):
     """Pass points."""
 
-    rows: Annotated[Whole, After(bounded(ROWS))] = key("Points across the flight at each nadir", USUAL_POINTS.rows)
-    reach_percent: Annotated[Positive, After(bounded(ROW_REACH))] = key(
+    rows: Annotated[Whole, Range(2, 20, "rows")] = key("Points across the flight at each nadir", USUAL_POINTS.rows)
+    reach_percent: Annotated[Positive, Range(5.0, 95.0, "%")] = key(
         "Outermost rows, of half the width of the photo", USUAL_POINTS.reach_percent, unit="%"
     )
-    extra_per_model: Annotated[Whole, After(bounded(EXTRA))] = key(
+    extra_per_model: Annotated[Whole, Range(0, 200, "points")] = key(
         "Further points in each model", USUAL_POINTS.extra_per_model
     )
 
@@ -299,12 +263,7 @@ class StripSpot(Section):
     """One control point."""
 
     at: tuple[Whole, Whole] = key("Photo at whose nadir it lies, and row from left to right, both counted from 1")
-    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
-
-
-def _spot(value: object) -> object:
-    """Let photo and row stand for a point that is given in full."""
-    return {"at": value} if isinstance(value, list) else value
+    use: Use = key("`xyz`, `xy` or `z`", "xyz")
 
 
 def _layout(value: object) -> object:
@@ -337,16 +296,14 @@ def _required(value: object) -> object:
 class StripLayout(Section):
     """One layout of control."""
 
-    layout: Annotated[Words, After(one_of(*STRIP_LAYOUTS))] = key(
+    layout: Annotated[str, choice(*STRIP_LAYOUTS)] = key(
         "`bands`, `corners`, `corners+centre`, or `points` alone", USUAL_LAYOUT.kind
     )
     bands: Whole = key("Bands across the strip, from the first to the last photo", USUAL_LAYOUT.bands)
-    every: Annotated[Whole, After(bounded(Range(1, 400, "models")))] | None = key(
-        "Models from band to band, instead of `bands`", None
-    )
+    every: Annotated[Whole, Range(1, 400, "models")] | None = key("Models from band to band, instead of `bands`", None)
     per_band: Whole = key("Points of a band", USUAL_LAYOUT.per_band)
-    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
-    points: list[Annotated[StripSpot, Before(_spot)]] = key(
+    use: Use = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
+    points: list[Annotated[StripSpot, Before(at)]] = key(
         "Single points, further ones or instead of a band's: [photo, row], or {at: [photo, row], use: z}", []
     )
     sigma: Sigmas | None = key("Standard deviations along, across, in height; default: `control_sigma`", None, unit="m")
@@ -360,6 +317,11 @@ class StripLayout(Section):
         if self.every is not None and "bands" in self.model_fields_set:
             raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
 
+    def named(self, name: str, sigma: tuple[float, float, float]) -> ControlLayout:
+        given = dict(self)
+        kind, spots = given.pop("layout"), tuple(Spot(spot.at[0], spot.at[1], spot.use) for spot in given.pop("points"))
+        return ControlLayout(**{**given, "name": name, "kind": kind, "spots": spots, "sigma": self.sigma or sigma})
+
 
 class StripRequired(Section):
     """The accuracy that every point must reach."""
@@ -371,18 +333,20 @@ class StripRequired(Section):
 class StripPlacement(Section):
     """Further control points to be placed as well as possible."""
 
-    points: Annotated[Whole, After(bounded(PLACED))] = key("How many")
+    points: Annotated[Whole, Range(1, 40, "points")] = key("How many")
     into: Id | None = key("Layout that they are added to; default: the first", None)
-    method: Annotated[Words, After(one_of(*METHODS))] = key("Method of adjustment", METHODS[-1])
-    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    method: Annotated[str, choice(*METHODS)] = key("Method of adjustment", METHODS[-1])
+    use: Use = key("`xyz`, `xy` or `z`", "xyz")
 
 
 class StripPlanFile(Flown):
     """A strip and layouts of its control. Every key but the first has a default."""
 
-    photostrip_plan_strip: FirstSchema = key("Number of this schema: 1")
+    photostrip_plan_strip: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "strip")
-    models: Annotated[Whole, After(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
+    models: Annotated[Whole, Range(LEAST_PHOTOS - 1, 400, "models")] = key(
+        "Models of the strip, one less than photos", 10
+    )
     points: StripPoints = key("Pass points", StripPoints())
     control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
     gnss: Sigmas | None = key(
@@ -395,7 +359,7 @@ class StripPlanFile(Flown):
         f" Default: {', '.join(DEFAULT_LAYOUTS)}",
         None,
     )
-    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(*METHODS)]], length(1)] = key(
         f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
     )
     required: Annotated[StripRequired, Before(_required)] = key(
@@ -416,76 +380,32 @@ class StripPlanFile(Flown):
             message = "measured perspective centres are of use to the bundle alone, which is not among the methods"
             raise wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
 
-
-@dataclass(frozen=True, eq=False)
-class StripPlan:
-    name: str
-    design: DesignTask
-    reading: Reading
-
-    def computed(self) -> DesignReport:
-        """Compute what the plan asks for, or raise all that cannot be planned, each fault at its place in the file."""
-        with self.reading.places(SIMULATED):
-            return plan_strip(self.design)
-
-
-def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
-    """Read the plan of a strip, or raise all its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_keys(StripPlanFile, path, assignments)
-    camera = camera_of(given.camera)
-    geometry = StripGeometry(
-        camera=camera,
-        photos=given.models + 1,
-        end_lap_percent=given.end_lap_percent,
-        scale=given.scale_of(camera),
-        points=Points(
-            rows=given.points.rows,
-            reach_percent=given.points.reach_percent,
-            scatter_percent=0.0,
-            extra_per_model=given.points.extra_per_model,
-        ),
-        image_sigma=given.image_sigma_um / 1000.0,
-    )
-    usual = {name: valid_section(StripLayout, _layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
-    chosen = [(name, each) for name, each in (given.layouts or usual).items() if each is not None]
-    layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
-    if given.gnss is not None:
-        plain = [layout for layout in layouts if layout.gnss is None]
-        layouts += tuple(replace(each, name=f"{each.name} + GNSS", gnss=given.gnss) for each in plain)
-    placement = None
-    if given.place is not None:
-        into = str(given.place.into) if given.place.into is not None else layouts[0].name
-        placement = Placement(
-            points=given.place.points, into=into, method=str(given.place.method), use=str(given.place.use)
+    @property
+    def design(self) -> DesignTask:
+        camera = camera_of(self.camera)
+        geometry = StripGeometry(
+            camera=camera,
+            photos=self.models + 1,
+            end_lap_percent=self.end_lap_percent,
+            scale=self.scale_of(camera),
+            points=replace(USUAL_POINTS, scatter_percent=0.0, **dict(self.points)),
+            image_sigma=self.image_sigma_um / MICROMETRES,
         )
-    methods = tuple(dict.fromkeys(str(method) for method in given.methods))
-    required = Demand(given.required.plan, given.required.height)
-    return StripPlan(
-        str(given.name),
-        DesignTask(geometry=geometry, layouts=layouts, methods=methods, required=required, placement=placement),
-        reading,
-    )
+        usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
+        layouts = tuple(each.named(name, self.control_sigma) for name, each in (self.layouts or usual).items())
+        if self.gnss is not None:
+            plain = [layout for layout in layouts if layout.gnss is None]
+            layouts += tuple(replace(each, name=f"{each.name} + GNSS", gnss=self.gnss) for each in plain)
+        placement = None
+        if self.place is not None:
+            placement = Placement(**{**dict(self.place), "into": self.place.into or layouts[0].name})
+        methods, required = tuple(dict.fromkeys(self.methods)), Demand(**dict(self.required))
+        return DesignTask(geometry, layouts, methods, required, placement)
 
 
-def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> ControlLayout:
-    return ControlLayout(
-        name=name,
-        kind=str(given.layout),
-        bands=given.bands,
-        every=given.every,
-        per_band=given.per_band,
-        use=str(given.use),
-        spots=tuple(Spot(spot.at[0], spot.at[1], str(spot.use)) for spot in given.points),
-        sigma=given.sigma or sigma,
-        gnss=given.gnss,
-        gnss_offset=given.gnss_offset,
-    )
-
-
-Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
-Relief = Annotated[Number, After(bounded(Range(0.0, 9000.0, "m")))]
-Slope = Annotated[Number, After(bounded(Range(0.0, 89.0, "deg")))]
-FLIGHTS = ("scale", "flying_height", "height_sigma")
+Lap = Annotated[Number, Range(0.0, 90.0, "%")]
+Relief = Annotated[Number, Range(0.0, 9000.0, "m")]
+Slope = Annotated[Number, Range(0.0, 89.0, "deg")]
 
 
 class PlanCamera(Section):
@@ -524,11 +444,10 @@ class PlanCamera(Section):
             raise wrong(message, code="missing-key", at="distortion", expected="`format`")
 
 
-class CameraPlanFile(Section):
+class CameraPlanFile(PlanFile):
     """Cameras to compare."""
 
-    photostrip_plan_cameras: FirstSchema = key("Number of this schema: 1")
-    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    photostrip_plan_cameras: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the comparison", "cameras")
     end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
     side_lap_percent: Lap = key("Overlap of neighbouring strips: what is left of the width is useful", 0.0, unit="%")
@@ -568,55 +487,26 @@ class CameraPlanFile(Section):
             message = "how far photos overlap on high ground follows from their format, which is not given"
             raise wrong(message, code="missing-key", at="relief", fix="give `format` for all cameras")
 
+    @property
+    def compared(self) -> tuple[ComparedCamera, ...]:
+        return tuple(self._compared(name, each) for name, each in self.cameras.items())
 
-class CameraPlan(NamedTuple):
-    name: str
-    cameras: tuple[camera_efficiency.ComparedCamera, ...]
-    reference: camera_efficiency.ComparedCamera
-    survey: camera_efficiency.FlownSurvey | None  # nothing where only the cameras are compared
-    files: Sequence[str]
+    @property
+    def survey(self) -> FlownSurvey | None:
+        """What is flown; nothing where only the cameras are compared."""
+        if all(getattr(self, name) is None for name in FLIGHTS):
+            return None
+        terrain = HighGround(self.relief, float(np.radians(self.slope_deg)))
+        return FlownSurvey(self.scale, self.flying_height, self.height_sigma, terrain)
 
-
-def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
-    """Read a list of cameras to compare, or raise every fault of it."""
-    given, reading = read_keys(CameraPlanFile, path, assignments)
-    cameras = tuple(_compared(str(name), each, given) for name, each in given.cameras.items())
-    named = {camera.name: camera for camera in cameras}
-    return CameraPlan(
-        name=str(given.name),
-        cameras=cameras,
-        reference=named.get(str(given.reference), cameras[-1]),
-        survey=_survey(given),
-        files=reading.files,
-    )
-
-
-def _survey(given: CameraPlanFile) -> camera_efficiency.FlownSurvey | None:
-    if all(getattr(given, name) is None for name in FLIGHTS):
-        return None
-    return camera_efficiency.FlownSurvey(
-        scale=given.scale,
-        flying_height=given.flying_height,
-        height_sigma=given.height_sigma,
-        terrain=camera_efficiency.HighGround(given.relief, float(np.radians(given.slope_deg))),
-    )
-
-
-def _compared(name: str, given: PlanCamera, plan: CameraPlanFile) -> camera_efficiency.ComparedCamera:
-    # without a format all cameras count as equally wide
-    length, width = given.format or (None, camera_efficiency.PRINTED_BASE)
-    base = given.base
-    if base is None and length is not None:
-        base = length * (1.0 - plan.end_lap_percent / 100.0)
-    useful = width * (1.0 - plan.side_lap_percent / 100.0)
-    return camera_efficiency.ComparedCamera(
-        name=name,
-        focal=given.principal_distance,
-        sigma=_sigma(name, given, base or np.nan, useful),
-        base=base or np.nan,
-        width=useful,
-        length=length,
-    )
+    def _compared(self, name: str, given: PlanCamera) -> ComparedCamera:
+        # without a format all cameras count as equally wide
+        length, width = given.format or (None, camera_efficiency.PRINTED_BASE)
+        base = given.base
+        if base is None and length is not None:
+            base = length * (1.0 - self.end_lap_percent / 100.0)
+        useful, known = width * (1.0 - self.side_lap_percent / 100.0), base or np.nan
+        return ComparedCamera(name, given.principal_distance, _sigma(name, given, known, useful), known, useful, length)
 
 
 def _sigma(name: str, given: PlanCamera, base: float, width: float) -> float:
@@ -635,38 +525,29 @@ def _sigma(name: str, given: PlanCamera, base: float, width: float) -> float:
         raise InputError(replace(fault, key=f"cameras.{name}.distortion") for fault in error.faults) from None
 
 
-PRESET = "UMK 10/1318"
-CONVERGENCE = Range(-45.0, 45.0, "deg")
-POWER = Range(0.5, 0.9999, "")
-Metres = Annotated[Number, After(bounded(DISTANCE))]
-
-
-class DisplacementPlanFile(Section):
+class DisplacementPlanFile(PlanFile):
     """Expected accuracy of displacements. Every key but the first has a default."""
 
-    photostrip_plan_displacement: FirstSchema = key("Number of this schema: 1")
-    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    photostrip_plan_displacement: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "displacements")
     camera: CameraOrName = key(
         "Camera: its name in a list, or preset, principal_distance, format", Phototheodolite(preset=PRESET)
     )
     presets: Words | None = key("A list of cameras of your own", None)
-    stations: Annotated[Words, After(one_of("2", "1"))] = key(
-        "2, at the ends of a base, or 1, with known distances", "2"
-    )
-    base: Annotated[Number, After(bounded(BASE))] = key("Length of the base", 20.0, unit="m")
-    convergence_deg: Annotated[Number, After(bounded(CONVERGENCE))] = key(
+    stations: Annotated[str, choice("2", "1")] = key("2, at the ends of a base, or 1, with known distances", "2")
+    base: Annotated[Number, BASE] = key("Length of the base", 20.0, unit="m")
+    convergence_deg: Annotated[Number, Range(-45.0, 45.0, "deg")] = key(
         "Turn of each camera towards the other", 0.0, unit="deg"
     )
-    distances: Annotated[list[Metres], length(1, 50)] = key(
+    distances: Annotated[list[Annotated[Number, DISTANCE]], length(1, 50)] = key(
         "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
     )
     sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
     sigma_d_um: SigmaUm | None = key("That of a pseudo-parallax, instead; default: 5", None, unit="um")
-    significance: Annotated[Fraction, After(bounded(SIGNIFICANCE))] = key(
+    significance: Annotated[Fraction, SIGNIFICANCE] = key(
         "Probability of calling a point moved that did not move", DisplacementSpec.significance
     )
-    power: Annotated[Fraction, After(bounded(POWER))] = key(
+    power: Annotated[Fraction, Range(0.5, 0.9999)] = key(
         "Probability with which the displacements stated are found", DisplacementSpec.power
     )
 
@@ -678,70 +559,53 @@ class DisplacementPlanFile(Section):
         if self.stations == "1" and self.convergence_deg:
             raise wrong("one camera has no other to be turned towards", at="convergence_deg", fix="remove it")
 
-
-class DisplacementPlan(NamedTuple):
-    name: str
-    spec: DisplacementSpec
-    files: Sequence[str]
-
-
-def load_displacement_plan(path: Path | None, assignments: Sequence[str]) -> DisplacementPlan:
-    """Read the plan of a survey, or raise its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_keys(DisplacementPlanFile, path, assignments)
-    camera = only_camera(given.camera, reading, whole=True)
-    change = given.sigma_d_um or 5.0
-    if given.sigma_um is not None:
-        change = float(np.sqrt(2.0)) * given.sigma_um  # of a coordinate in two epochs
-    spec = DisplacementSpec(
-        camera,
-        distances=tuple(given.distances),
-        sigma=change / MICROMETRES,
-        base=given.base if given.stations == "2" else None,
-        convergence=float(np.radians(given.convergence_deg)),
-        significance=given.significance,
-        power=given.power,
-    )
-    return DisplacementPlan(name=str(given.name), spec=spec, files=reading.files)
+    def spec(self, reading: Reading) -> DisplacementSpec:
+        """Return what is planned with a camera of a list, or raise why there is none."""
+        camera = only_camera(self.camera, reading, whole=True)
+        change = self.sigma_d_um or 5.0
+        if self.sigma_um is not None:
+            change = float(np.sqrt(2.0)) * self.sigma_um  # of a coordinate in two epochs
+        return DisplacementSpec(
+            camera,
+            distances=tuple(self.distances),
+            sigma=change / MICROMETRES,
+            base=self.base if self.stations == "2" else None,
+            convergence=float(np.radians(self.convergence_deg)),
+            significance=self.significance,
+            power=self.power,
+        )
 
 
-USUAL_SCREENING = ScreeningSpec()
-PAIR_FOCAL, LENGTH = Range(10.0, 1000.0, "mm"), Range(1.0, 500.0, "mm")
-TILT, PAIR_RELIEF = Range(0.0, 10.0, "deg"), Range(0.0, 50.0, "%")
-POINTS, PAIRS = Range(0, 100, ""), Range(1, 1000, "")
-REPETITIONS = Range(1, 1000, "")
-
-Size = Annotated[Number, After(bounded(LENGTH))]
-Count = Annotated[Whole, After(bounded(POINTS))]
+Size = Annotated[Number, Range(1.0, 500.0, "mm")]
 
 
-class ScreeningPlanFile(Section):
+class ScreeningPlanFile(PlanFile):
     """An experiment with gross errors in pairs; the defaults are the published one."""
 
-    photostrip_plan_screening: FirstSchema = key("Number of this schema: 1")
-    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    photostrip_plan_screening: SchemaNumber = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "screening")
-    principal_distance: Annotated[Number, After(bounded(PAIR_FOCAL))] = key(
-        "Principal distance", USUAL_SCREENING.layout.focal, unit="mm"
+    principal_distance: Annotated[Number, Range(10.0, 1000.0, "mm")] = key(
+        "Principal distance", USUAL_PAIR.focal, unit="mm"
     )
-    base: Size = key("Photo base", USUAL_SCREENING.layout.base, unit="mm")
-    width: Size = key("Distance of the side zones from the base", USUAL_SCREENING.layout.width, unit="mm")
-    zone_points: Annotated[list[Count], length(ZONES, ZONES)] = key(
-        "Points in each of the standard zones 1 to 6", list(USUAL_SCREENING.layout.counts)
+    base: Size = key("Photo base", USUAL_PAIR.base, unit="mm")
+    width: Size = key("Distance of the side zones from the base", USUAL_PAIR.width, unit="mm")
+    zone_points: Annotated[list[Annotated[Whole, Range(0, 100)]], length(ZONES, ZONES)] = key(
+        "Points in each of the standard zones 1 to 6", list(USUAL_PAIR.counts)
     )
     zone_reach: NotNegative = key(
         "How far points lie from the middle of their zone, in x and y, at most",
-        USUAL_SCREENING.layout.scatter,
+        USUAL_PAIR.scatter,
         unit="mm",
     )
-    tilt: Annotated[Number, After(bounded(TILT))] = key("Largest tilt", USUAL_SCREENING.layout.tilt, unit="deg")
-    relief_percent: Annotated[Number, After(bounded(PAIR_RELIEF))] = key(
-        "Largest relief, up and down, of the flying height", 100 * USUAL_SCREENING.layout.relief, unit="%"
+    tilt: Annotated[Number, Range(0.0, 10.0, "deg")] = key("Largest tilt", USUAL_PAIR.tilt, unit="deg")
+    relief_percent: Annotated[Number, Range(0.0, 50.0, "%")] = key(
+        "Largest relief, up and down, of the flying height", 100 * USUAL_PAIR.relief, unit="%"
     )
     parallax_sigma_um: SigmaUm = key(
-        "Standard deviation of a y parallax", MICROMETRES * USUAL_SCREENING.layout.parallax_sigma, unit="um"
+        "Standard deviation of a y parallax", MICROMETRES * USUAL_PAIR.parallax_sigma, unit="um"
     )
-    models: Annotated[Whole, After(bounded(PAIRS))] = key("Pairs, each with an error", USUAL_SCREENING.models)
-    second_errors: Annotated[Whole, After(bounded(Range(0, 1000, "")))] = key(
+    models: Annotated[Whole, Range(1, 1000)] = key("Pairs, each with an error", USUAL_SCREENING.models)
+    second_errors: Annotated[Whole, Range(0, 1000)] = key(
         "Pairs of them that have a second one", USUAL_SCREENING.second
     )
     error_sizes_um: Annotated[list[Positive], length(1, 20)] = key(
@@ -749,15 +613,15 @@ class ScreeningPlanFile(Section):
         [MICROMETRES * size for size in USUAL_SCREENING.sizes],
         unit="um",
     )
-    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(*SCREENINGS)]], length(1)] = key(
         "Methods, of `processing.relative.screening`", list(USUAL_SCREENING.methods)
     )
     grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL_SCREENING.grubbs_alpha)
     parallax_limit: Positive = key("Limit of `parallax+grubbs`", USUAL_SCREENING.parallax_limit, unit="mm")
-    repetitions: Annotated[Whole, After(bounded(REPETITIONS))] = key(
-        "How often the experiment is made", USUAL_SCREENING.repetitions
+    repetitions: Annotated[Whole, Range(1, 1000)] = key("How often the experiment is made", USUAL_SCREENING.repetitions)
+    seed: Annotated[Whole, Range(0, LARGEST_NUMBER)] = key(
+        "Number that makes the drawn pairs and errors the same again", USUAL_SCREENING.seed
     )
-    seed: Whole = key("Number that makes the drawn pairs and errors the same again", USUAL_SCREENING.seed)
 
     @rule
     def _errors_have_pairs(self) -> None:
@@ -765,52 +629,49 @@ class ScreeningPlanFile(Section):
             message = f"{self.second_errors} second errors do not go into {self.models} pairs"
             raise wrong(message, code="range", at="second_errors", expected=f"0 to {self.models}")
 
-
-class ScreeningPlan(NamedTuple):
-    name: str
-    spec: ScreeningSpec
-    files: Sequence[str]
-
-
-def load_screening_plan(path: Path | None, assignments: Sequence[str]) -> ScreeningPlan:
-    """Read the plan of an experiment, or raise its faults; without a file the assignments and defaults are the plan."""
-    given, reading = read_keys(ScreeningPlanFile, path, assignments)
-    layout = PairLayout(
-        focal=given.principal_distance,
-        base=given.base,
-        width=given.width,
-        counts=tuple(given.zone_points),
-        scatter=given.zone_reach,
-        tilt=given.tilt,
-        relief=given.relief_percent / 100,
-        parallax_sigma=given.parallax_sigma_um / MICROMETRES,
-    )
-    spec = ScreeningSpec(
-        layout=layout,
-        models=given.models,
-        second=given.second_errors,
-        sizes=tuple(size / MICROMETRES for size in given.error_sizes_um),
-        methods=tuple(dict.fromkeys(map(str, given.methods))),
-        grubbs_alpha=given.grubbs_alpha,
-        parallax_limit=given.parallax_limit,
-        repetitions=given.repetitions,
-        seed=given.seed,
-    )
-    return ScreeningPlan(name=str(given.name), spec=spec, files=reading.files)
+    @property
+    def spec(self) -> ScreeningSpec:
+        layout = PairLayout(
+            focal=self.principal_distance,
+            base=self.base,
+            width=self.width,
+            counts=tuple(self.zone_points),
+            scatter=self.zone_reach,
+            tilt=self.tilt,
+            relief=self.relief_percent / 100,
+            parallax_sigma=self.parallax_sigma_um / MICROMETRES,
+        )
+        return ScreeningSpec(
+            layout=layout,
+            models=self.models,
+            second=self.second_errors,
+            sizes=tuple(size / MICROMETRES for size in self.error_sizes_um),
+            methods=tuple(dict.fromkeys(self.methods)),
+            grubbs_alpha=self.grubbs_alpha,
+            parallax_limit=self.parallax_limit,
+            repetitions=self.repetitions,
+            seed=self.seed,
+        )
 
 
 class StepKeys(Section):
     """A step that needs nothing but its table."""
 
-    photostrip_step: FirstSchema = key("Number of this schema: 1")
+    photostrip_step: SchemaNumber = key("Number of this schema: 1")
 
 
 class InteriorKeys(StepKeys):
     """The transformation of measured fiducial marks to calibrated ones, mm."""
 
-    transform: Annotated[Words, After(one_of("conformal", "affine", "bilinear", "projective"))] = key(
+    transform: Annotated[str, choice("conformal", "affine", "bilinear", "projective")] = key(
         "From measured to photo coordinates: conformal, affine, bilinear, projective", "affine"
     )
+
+
+class TurnedKeys(StepKeys):
+    """A step with rotations."""
+
+    angles: Annotated[str, choice(*STEP_ANGLES)] = key("System of the angles, given and found", STEP_ANGLES[0])
 
 
 class FocalKeys(StepKeys):
@@ -828,19 +689,19 @@ class RefineKeys(FocalKeys):
     ground_height: Number = key("Of the terrain, above sea level", 0.0, unit="m")
 
 
-class RelativeKeys(FocalKeys):
+class RelativeKeys(FocalKeys, TurnedKeys):
     """Two photos oriented relative to each other, and their model."""
 
     base: Positive = key("Length of the first base", 100.0, unit="unit")
     unit: Words = key("What model coordinates are in", "mm")
 
 
-class IntersectionKeys(FocalKeys):
+class IntersectionKeys(FocalKeys, TurnedKeys):
     """The rays of two photos of known orientation."""
 
     base: Triple = key("From the left to the right perspective centre", unit="unit")
-    left: Triple = key("Omega, phi, kappa of the left photo", (0.0, 0.0, 0.0), unit="deg")
-    right: Triple = key("Omega, phi, kappa of the right photo", (0.0, 0.0, 0.0), unit="deg")
+    left: Triple = key("Angles of the left photo", (0.0, 0.0, 0.0), unit="deg")
+    right: Triple = key("Angles of the right photo", (0.0, 0.0, 0.0), unit="deg")
     unit: Words = key("What coordinates are in", "m")
     left_ray: Flag = key("Y of the left ray, as printed, instead of the mean of both", False)  # noqa: FBT003
 
@@ -848,24 +709,25 @@ class IntersectionKeys(FocalKeys):
 class StripKeys(RelativeKeys):
     """A strip formed from photos alone."""
 
-    scale_transfer: Annotated[Words, After(one_of("least_squares", "distances"))] = key(
+    scale_transfer: Annotated[str, choice("least_squares", "distances")] = key(
         "Weights of the pass points: least_squares or distances", "least_squares"
     )
 
 
-class AbsoluteKeys(StepKeys):
+class AbsoluteKeys(TurnedKeys):
     """A model fitted to known points."""
 
     unit: Words = key("What ground coordinates are in", "m")
 
 
-class PolynomialKeys(AbsoluteKeys):
+class PolynomialKeys(StepKeys):
     """The deformation of a strip along one axis."""
 
-    terms: list[Annotated[Words, After(one_of(*POWERS))]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
+    unit: Words = key("What ground coordinates are in", "m")
+    terms: list[Annotated[str, choice(*POWERS)]] = key(f"Of {', '.join(POWERS)}", ["1", "X", "Y"])
 
 
-class ResectionKeys(FocalKeys):
+class ResectionKeys(FocalKeys, TurnedKeys):
     """One photo oriented on known points."""
 
     sigma_um: Positive = key("Standard deviation of an image coordinate", 5.0, unit="um")
@@ -878,3 +740,51 @@ class BundleKeys(ResectionKeys):
     base: Positive = key("Length of the first base, without control", 100.0, unit="unit")
     control: Words | None = key("Table of given points: point, x_ground, y_ground, z_ground", None)
     control_sigma: Positive = key("Standard deviation of a given coordinate", 0.05, unit="unit")
+
+
+class PairScalesKeys(StepKeys):
+    """Distances of points in two systems."""
+
+    unit: Words = key("What ground coordinates are in", "m")
+
+
+class FrameKeys(StepKeys):
+    """Geodetic coordinates taken into an intermediate frame at their middle."""
+
+    azimuth: Annotated[Number, Range(-360.0, 360.0, "deg")] = key(
+        "Of the X axis, clockwise from north", 0.0, unit="deg"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid, its semi-axes; default: WGS 84", None)
+
+
+class CurvatureKeys(StepKeys):
+    """The Earth's curvature below plane coordinates, from their middle."""
+
+    radius: Positive = key("Of the Earth, without a latitude", EARTH_RADIUS, unit="m")
+    latitude: Annotated[Number, Range(-90.0, 90.0, "deg")] | None = key(
+        "Of the strip: the radius of WGS 84 in its azimuth counts", None, unit="deg"
+    )
+    azimuth: Annotated[Number, Range(-360.0, 360.0, "deg")] = key("Of the strip, clockwise from north", 0.0, unit="deg")
+
+    @property
+    def radius_of_strip(self) -> float:
+        if self.latitude is None:
+            return self.radius
+        return float(radius_in_azimuth(np.radians(self.latitude), np.radians(self.azimuth), WGS84))
+
+
+class ClosedFormKeys(StepKeys):
+    """Errors of points of an oriented model per error of each element, in closed form."""
+
+    control: Words = key("Table of control, given in full: point, x, y from the left nadir, mm at photo scale")
+    base: Positive = key("Photo base", unit="mm")
+    principal_distance: Positive = key("Principal distance", unit="mm")
+    as_printed: Flag = key("With the misprints of the source", default=False)
+
+
+class DeformationKeys(StepKeys):
+    """The surface that twist and bending of a model make of its heights: x, y in mm at photo scale, dz in metres."""
+
+    sigma: Positive = key("Standard deviation of dz", 0.1, unit="m")
+    scale: Positive = key("Denominator of the photo scale")
+    base: Positive = key("Photo base", unit="mm")

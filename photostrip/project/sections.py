@@ -14,10 +14,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, Union, g
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, model_validator
 from pydantic_core import core_schema
 
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
-from photostrip.formats.text.tables import CONTROL_CHARACTER
+from photostrip.formats.faults import SMALLEST_LENGTH, NotANumber, shown, suggestion
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 
 T = TypeVar("T", bound="Section")
@@ -169,6 +168,14 @@ def number_between(
     return read
 
 
+def whole(value: object) -> int:
+    """Read a whole number."""
+    result = number_between("a whole number")(value)
+    if result != int(result):
+        raise wrong(f"{value} is not a whole number", code="number", expected="a whole number")
+    return int(result)
+
+
 def or_auto(read: Callable[[object], float]) -> Callable[[object], float | None]:
     """Reader of a number that may also be ``auto`` (None)."""
     return lambda value: None if value == "auto" else read(value)
@@ -187,14 +194,10 @@ def _one_of(allowed: tuple[str, ...]) -> str:
     return allowed[0] if len(allowed) == 1 else f"one of {', '.join(allowed)}"
 
 
-def choice(allowed: tuple[str, ...]) -> Read:
+def choice(*allowed: str) -> Read:
+    """In an annotation: one of some words."""
     values = [int(each) if each.isdecimal() else each for each in allowed]
     return Read(lambda value: known_word(single(value, _one_of(allowed)), allowed), {"enum": values})
-
-
-def one_of(*allowed: str) -> Callable[[str], str]:
-    """Check of a word from a list, of which editors know the description alone."""
-    return lambda value: str(known_word(value, allowed))
 
 
 def _flag(value: object) -> bool:
@@ -204,29 +207,11 @@ def _flag(value: object) -> bool:
     return word in TRUE
 
 
-def schema_number(name: str, kind: str = "") -> Read:
-    """Read the number of a schema, the value of the key `name`, which is 1 of all of them."""
-
-    def read(value: object) -> int:
-        if single(value, "1") != "1":
-            message = f"this version of photostrip does not read schema {shown(str(value))}{kind}"
-            raise wrong(message, code="schema-number", expected=f"{name}: 1")
-        return 1
-
-    return Read(read, {"const": 1})
-
-
-def whole(value: object) -> int:
-    expected = "a whole number"
-    if not isinstance(value, str) or not value:
-        raise wrong("no number is given here", code="type", expected=expected)
-    try:
-        result = read_number(value)
-    except NotANumber as why:
-        raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
-    if result != int(result):
-        raise wrong(f"{shown(value)} is not a whole number", code="number", expected=expected)
-    return int(result)
+def _schema_number(value: object) -> int:
+    if single(value, "1") != "1":
+        message = f"this version of photostrip does not read schema {shown(str(value))}"
+        raise wrong(message, code="schema-number", expected="1")
+    return 1
 
 
 def _axes(value: object) -> tuple[str, str, str]:
@@ -241,11 +226,11 @@ def _axes(value: object) -> tuple[str, str, str]:
 
 
 class Range(NamedTuple):
-    """Limits of a quantity: wide ones, that catch a wrong unit or a slip of the pen."""
+    """Limits of a quantity: wide ones, that catch a wrong unit or a slip of the pen; in an annotation they are kept."""
 
     least: float
     most: float
-    unit: str
+    unit: str = ""
 
     def __str__(self) -> str:
         return f"{self.least:g} to {self.most:g} {self.unit}".rstrip()
@@ -258,16 +243,17 @@ class Range(NamedTuple):
         """Return the limits in another unit, which is `scale` of this one."""
         return Range(self.least / scale, self.most / scale, unit or self.unit)
 
-
-def bounded(limits: Range) -> Callable[[float], float]:
-    """Check of a number within limits."""
-
-    def check(value: float) -> float:
-        if not limits.holds(value):
-            raise wrong(f"{value:g} is out of range", code="range", expected=str(limits))
+    def kept(self, value: float) -> float:
+        """Return a value within the limits."""
+        if not self.holds(value):
+            raise wrong(f"{value:g} is out of range", code="range", expected=str(self))
         return value
 
-    return check
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> core_schema.CoreSchema:  # noqa: ANN401 (a type)
+        return core_schema.no_info_after_validator_function(self.kept, handler(source))
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:  # noqa: ANN401 (any schema)
+        return {**handler(core), "minimum": self.least, "maximum": self.most}
 
 
 def if_empty(value: object) -> object:
@@ -299,6 +285,6 @@ Pair = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
 Sigma3 = tuple[Positive, Positive, Positive]
 Axes = Annotated[tuple[str, str, str], Read(_axes, _AXES)]
-YAxis = Annotated[str, choice(("up", "down"))]
-Height = Annotated[str, choice(("ellipsoidal", "orthometric"))]
-FirstSchema = Annotated[Words, After(one_of("1"))]  # number of a schema that has not changed
+YAxis = Annotated[str, choice("up", "down")]
+Height = Annotated[str, choice("ellipsoidal", "orthometric")]
+SchemaNumber = Annotated[int, Read(_schema_number, {"const": 1})]

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from photostrip import camera, simulation
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import shown
+from photostrip.formats.faults import shown, suggestion
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.keys import CRS, UNDULATION, Distortion, Ellipsoid, Unit
 from photostrip.project.reading import Reading, read_file
@@ -26,13 +25,13 @@ from photostrip.project.sections import (
     Number,
     Pair,
     Positive,
+    SchemaNumber,
     Section,
     Triple,
     Whole,
     Words,
     YAxis,
     key,
-    schema_number,
     wrong,
 )
 
@@ -189,9 +188,6 @@ class Models(Section):
     axes: Words = key("`level`: nearly, turned about the vertical; `any`: lying in any way", USUAL_MODELS.axes)
     hand: Words = key("`right-handed` or `left-handed`", USUAL_MODELS.hand)
     centers: Flag = key("Measure the perspective centres", USUAL_MODELS.centers)
-
-
-SchemaNumber = Annotated[int, schema_number("photostrip_simulation", " of simulations")]
 
 
 class SimulationFile(Section):

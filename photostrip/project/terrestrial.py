@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -13,11 +13,10 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import Fault
-from photostrip.formats.measured import terrestrial
-from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, ONE_STATION, SIGHTINGS, read_points
-from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import shown
-from photostrip.formats.text.tables import Table
+from photostrip.formats import terrestrial
+from photostrip.formats.faults import Findings, shown, suggestion
+from photostrip.formats.tables import Column, Table
+from photostrip.formats.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, ONE_STATION, SIGHTINGS, read_points
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
@@ -26,7 +25,6 @@ from photostrip.project.sections import (
     After,
     Axes,
     Before,
-    FirstSchema,
     Flag,
     Id,
     NotNegative,
@@ -34,14 +32,14 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    SchemaNumber,
     Section,
     Whole,
     Words,
     YAxis,
-    bounded,
+    choice,
     key,
     length,
-    one_of,
     rule,
     wrong,
 )
@@ -63,41 +61,56 @@ from photostrip.units import ARCSECONDS
 
 MILLIMETRES = {"mm": 1.0, "um": 1e-3}  # in a unit of image coordinates
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}  # in a unit of angles
-
-PRINCIPAL_DISTANCE = Range(1.0, 1e5, "mm")
-FORMAT = Range(1.0, 1e4, "mm")
-STEP = Range(1e-3, 1e5, "mm")
 COORDINATE = Range(-1e4, 1e4, "mm")
 IMAGE_SIGMA = Range(1e-6, 10.0, "mm")
 IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
 DIRECTION_SIGMA = Range(1e-4, 36_000.0, "″")
 DEGREES = Range(-1000.0, 1000.0, "deg")
-POSITION = Range(-1e8, 1e8, "m")
 BASE = Range(1e-3, 1e6, "m")
 DISTANCE = Range(1e-2, 1e6, "m")
-ECCENTRICITY = Range(-10.0, 10.0, "m")
-REFRACTION = Range(-10.0, 10.0, "")
-TIME = Range(-1e9, 1e9, "")
-SIGNIFICANCE = Range(1e-6, 0.5, "")
-
-
-def refuse_outside(
-    table: Table, columns: Sequence[str], limits: Range, findings: Findings, *, scale: float = 1.0, unit: str = ""
-) -> None:
-    """Refuse numbers of a table outside limits in its unit; empty cells do not count."""
-    bounds = limits.scaled(scale, unit)
-    for name in columns:
-        values = table.column(name)
-        for row in np.flatnonzero(~np.isnan(values) & ~((values >= bounds.least) & (values <= bounds.most))):
-            message = f"{values[row]:g} is out of range"
-            findings.add(table.fault(int(row), name, message, "range", expected=str(bounds)))
-
-
+SIGNIFICANCE = Range(1e-6, 0.5)
+LIMITS = {  # of the columns of tables
+    **dict.fromkeys(("x", "z", "p", "q", "dx", "dz", "dx_right", "dz_right"), COORDINATE),
+    **dict.fromkeys(("sx", "sz", "sigma", "sigma_d"), IMAGE_SIGMA),
+    **dict.fromkeys(("s_lambda", "s_beta"), DIRECTION_SIGMA),
+    **dict.fromkeys(("distance", "distance_later"), DISTANCE),
+    "lambda": DEGREES,
+}
+STEEPEST = np.radians(89.9999)
+MOST_POINTS = 20_000  # of a table over the photo
+KILOMETRE = 1e6  # mm
+JENA = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
+# Standard deviations of a horizontal and of a vertical direction in one round, both faces, arcseconds. Those of Carl
+# Zeiss Jena have in their names the lateral error in mm at 1 km [Pollmer 1976], the T2 that of an angle in arcseconds,
+# which is the difference of two horizontal directions (GOST 10529).
+THEODOLITES = {
+    **{name: (size / KILOMETRE * ARCSECONDS,) * 2 for name, size in JENA.items()},
+    "T2": (2.0 / np.sqrt(2.0), 2.0),
+}
+USUAL_DIRECTION = 2.0  # arcseconds
+USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none
+NORMAL_AXES = ("right", "ahead", "up")
+REFERENCE, SECOND = "first", "second"  # names of epochs that have none
+FEWEST_EPOCHS = 2
+USUAL = MonitoringSettings()
 OWN_LIST = "phototheodolites.yaml"
 
-Distance = Annotated[Number, After(bounded(PRINCIPAL_DISTANCE))]
-Place = tuple[Annotated[Number, After(bounded(COORDINATE))], Annotated[Number, After(bounded(COORDINATE))]]
-Size = tuple[Annotated[Number, After(bounded(FORMAT))], Annotated[Number, After(bounded(FORMAT))]]
+Distance = Annotated[Number, Range(1.0, 1e5, "mm")]
+Place = tuple[Annotated[Number, COORDINATE], Annotated[Number, COORDINATE]]
+Width = Annotated[Number, Range(1.0, 1e4, "mm")]
+Metres = Annotated[Number, Range(-1e8, 1e8, "m")]
+Step = Annotated[Number, Range(1e-3, 1e5, "mm")]
+Ahead = Annotated[Number, Range(-10.0, 10.0, "m")]
+Angle = Annotated[Number, DEGREES]
+Micrometres = Annotated[Number, IMAGE_SIGMA_UM]
+Seconds = Annotated[Number, DIRECTION_SIGMA]
+Level = Annotated[Number, SIGNIFICANCE]
+Unit = Annotated[str, choice("mm", "um")]
+AngleUnit = Annotated[str, choice("deg", "gon")]
+SIGMA = "Standard deviation of x, z and the principal distance"
+
+
+# ------------------------------------------------------------------------------------------------- cameras
 
 
 class Preset(Section):
@@ -105,13 +118,13 @@ class Preset(Section):
 
     principal_distance: Distance = key("Principal distance", unit="mm")
     principal_point: Place = key("Principal point x0, z0 in the system of the image coordinates", (0.0, 0.0), unit="mm")
-    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
+    format: tuple[Width, Width] | None = key("Width and height of the field of measurement", None, unit="mm")
 
 
 class PresetFile(Section):
     """A list of cameras."""
 
-    photostrip_cameras: FirstSchema = key("Number of this schema: 1")
+    photostrip_cameras: SchemaNumber = key("Number of this schema: 1")
     cameras: Annotated[dict[Id, Preset], length(1)] = key("Cameras by name")
 
 
@@ -125,7 +138,7 @@ class Camera(Section):
         None,
         unit="mm",
     )
-    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
+    format: tuple[Width, Width] | None = key("Width and height of the field of measurement", None, unit="mm")
 
     @rule
     def _has_a_principal_distance(self) -> None:
@@ -142,36 +155,21 @@ def _named(value: object) -> object:
 CameraOrName = Annotated[Camera, Before(_named)]
 
 
-def own_presets() -> dict[str, Phototheodolite]:
-    """Return the cameras that come with the program."""
-    text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
+def known_presets(reading: Reading | None = None) -> dict[str, Phototheodolite]:
+    """Return all cameras that can be named: those of the program, and before them those of the user's list."""
     findings = Findings()
-    found = _listed(parse(text, OWN_LIST, findings), findings)
-    findings.stop()
-    return found
-
-
-def known_presets(reading: Reading) -> dict[str, Phototheodolite]:
-    """Return all cameras that can be named; those of the user's list come before those of the program."""
-    known = own_presets()
-    for path, findings in reading.named(("presets",)):
-        known |= _listed(read_document(path, findings), reading.findings)
+    text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
+    known = _listed(parse(text, OWN_LIST, findings), findings)
+    if reading is not None:
+        for path, inner in reading.named(("presets",)):
+            known |= _listed(read_document(path, inner), reading.findings)
     return known
 
 
 def _listed(root: Node | None, findings: Findings) -> dict[str, Phototheodolite]:
     """Return the cameras of a list; none when it is at fault."""
     given = checked(PresetFile, root, findings) if root is not None else None
-    return {} if given is None else {name: _camera(name, each) for name, each in given.cameras.items()}
-
-
-def _camera(name: str, given: Preset) -> Phototheodolite:
-    return Phototheodolite(
-        str(name),
-        principal_distance=given.principal_distance,
-        principal_point=given.principal_point,
-        format=given.format,
-    )
+    return {} if given is None else {name: Phototheodolite(name, **dict(each)) for name, each in given.cameras.items()}
 
 
 def phototheodolite(
@@ -194,7 +192,7 @@ def phototheodolite(
 
 def only_camera(given: Camera, reading: Reading, *, whole: bool = False) -> Phototheodolite:
     """Return the camera under the key ``camera``, or raise every fault; `whole`: one that has a format."""
-    name = "camera" if given.preset is None else str(given.preset)
+    name = "camera" if given.preset is None else given.preset
     found = phototheodolite(name, given, known_presets(reading), reading, ("camera",))
     if whole and found is not None and found.format is None:
         message = f"the camera {name} has no format"
@@ -202,297 +200,22 @@ def only_camera(given: Camera, reading: Reading, *, whole: bool = False) -> Phot
     return reading.complete(found)
 
 
-STEEPEST = np.radians(89.9999)
+# ------------------------------------------------------------------------------- keys of a single photo
 
 
-class SightingUnits(NamedTuple):
-    """What the numbers of a table of sightings mean."""
+class CamerasFile(Section):
+    """Cameras that can be named."""
 
-    unit: str  # unit of image coordinates, ``"mm"`` or ``"um"``
-    angles: str  # unit of directions, ``"deg"`` or ``"gon"``
-    sigma: float  # standard deviation of image coordinates in mm of rows without one
-    theodolite: Theodolite  # standard deviations of directions of rows without one
-
-
-def read_sightings(file: str, units: SightingUnits, findings: Findings) -> Sightings | None:
-    """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]``.
-
-    Standard deviations are in the unit of the coordinates and in seconds of arc, distances in metres. One of lambda and
-    beta may be empty. None where there are faults.
-    """
-    read = read_points(file, SIGHTINGS, findings)
-    if read is None:
-        return None
-    scale, ids = MILLIMETRES[units.unit], tuple(read.cells("point"))
-    refuse_outside(read, ("x", "z"), COORDINATE, findings, scale=scale, unit=units.unit)
-    refuse_outside(read, ("sx", "sz"), IMAGE_SIGMA, findings, scale=scale, unit=units.unit)
-    refuse_outside(read, ("s_lambda", "s_beta"), DIRECTION_SIGMA, findings)
-    refuse_outside(read, ("distance",), DISTANCE, findings)
-    refuse_outside(read, ("lambda",), DEGREES, findings, unit=units.angles)
-    directions = read.columns("lambda", "beta")
-    for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
-        if not findings.number(file):
-            message = f"neither direction to point {ids[row]} is given"
-            findings.add(read.fault(int(row), "lambda", message, "no-direction", expected="lambda, beta or both"))
-    steep = np.abs(np.nan_to_num(directions[:, 1])) * RADIANS[units.angles] > STEEPEST
-    for row in np.flatnonzero(steep):
-        message = f"{directions[row, 1]:g} {units.angles} is not below the zenith"
-        expected = "an elevation between -90 and 90 degrees, not a zenith distance"
-        findings.add(read.fault(int(row), "beta", message, "range", expected=expected))
-    image, angular = read.columns("sx", "sz") * scale, read.columns("s_lambda", "s_beta")
-    usual = np.array([units.theodolite.horizontal, units.theodolite.vertical]) / units.theodolite.rounds**0.5
-    return Sightings(
-        ids=ids,
-        xz=read.columns("x", "z") * scale,
-        directions=directions * RADIANS[units.angles],
-        sigma_xz=np.where(np.isnan(image), units.sigma, image),
-        sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
-        distances=read.columns("distance")[:, 0],
-    )
-
-
-def read_one_station(
-    file: str,
-    unit: str,
-    sigmas: tuple[float, float, float],
-    stable: Sequence[str],
-    camera: Phototheodolite,
-    findings: Findings,
-) -> OneStation | None:
-    """Read ``point,x,z,dx,dz,distance[,distance_later][,sigma][,sigma_d][,sigma_distance]``; None with faults.
-
-    sigmas: standard deviations of coordinates and of pseudo-parallaxes, mm, and of distances, metres, of rows without.
-    """
-    read = read_points(file, ONE_STATION, findings)
-    if read is None:
-        return None
-    scale, ids = MILLIMETRES[unit], tuple(read.cells("point"))
-    refuse_outside(read, ("x", "z", "dx", "dz"), COORDINATE, findings, scale=scale, unit=unit)
-    refuse_outside(read, ("sigma", "sigma_d"), IMAGE_SIGMA, findings, scale=scale, unit=unit)
-    refuse_outside(read, ("distance", "distance_later"), DISTANCE, findings)
-    for number, name in enumerate(stable):
-        if name not in ids:
-            message, fix = f"{file} has no point {shown(name)}", suggestion(name, ids)
-            findings.add(Fault(message, "unknown-point", key=f"stable[{number}]", fix=fix))
-    own = read.columns("sigma", "sigma_d", "sigma_distance") * [scale, scale, 1.0]
-    own = np.where(np.isnan(own), sigmas, own)
-    return OneStation(
-        points=ids,
-        first=read.columns("x", "z") * scale - camera.principal_point,
-        change=read.columns("dx", "dz") * scale,
-        sigma=own[:, 0],
-        sigma_change=own[:, 1],
-        distances=read.columns("distance", "distance_later"),
-        sigma_distance=own[:, 2],
-        stable=np.isin(ids, list(stable)),
-    )
-
-
-LAYOUTS = {"coordinates": terrestrial.COORDINATES, "pseudo_parallaxes": terrestrial.PSEUDO_PARALLAXES}
-REFERENCE, SECOND = "first", "second"  # names of epochs that have none
-FEWEST_EPOCHS = 2
-
-
-@dataclass(frozen=True)
-class SeriesUnits:
-    """What the numbers of a table mean."""
-
-    kind: str  # ``"coordinates"`` or ``"pseudo_parallaxes"``
-    unit: str  # ``"mm"`` or ``"um"``
-    z_axis: str  # ``"up"`` or ``"down"``
-    # sigma, sigma_d: standard deviations of coordinates and of pseudo-parallaxes, in the unit, of rows without one
-    sigma: float | None
-    sigma_d: float | None
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the project says of epochs and points."""
-
-    epochs: tuple[str, ...] = ()  # epochs in order, the first being the reference; empty: as they stand in the table
-    times: tuple[float, ...] | None = None
-    stable: tuple[str, ...] = ()
-
-
-def read_series(file: str, table: SeriesUnits, centre: Floats, wanted: Wanted, findings: Findings) -> Series | None:
-    """Read a table of measurements, in mm, reduced to the principal points, z up; None when there are faults.
-
-    centre: (2, 2), principal points of the left and right camera in mm, z up.
-    """
-    reader = terrestrial.read_coordinates if table.kind == "coordinates" else terrestrial.read_pseudo_parallaxes
-    read = reader(file, findings)
-    if read is None or findings.number(file):
-        return None
-    scale = MILLIMETRES[table.unit]
-    coordinates = [each.name for each in LAYOUTS[table.kind] if each.number and not each.positive]
-    deviations = [each.name for each in LAYOUTS[table.kind] if each.number and each.positive]
-    refuse_outside(read.table, coordinates, COORDINATE, findings, scale=scale, unit=table.unit)
-    refuse_outside(read.table, deviations, IMAGE_SIGMA, findings, scale=scale, unit=table.unit)
-    epochs = _epochs(read, table.kind, wanted, findings)
-    stable = _stable(read, wanted.stable, findings)
-    build = _from_coordinates if table.kind == "coordinates" else _from_pseudo_parallaxes
-    built = build(read, table, centre, epochs, findings)
-    if findings.number(file) or findings.number("") or built is None:
-        return None
-    times = None if wanted.times is None or len(wanted.times) != len(epochs) else np.array(wanted.times)
-    return Series(
-        points=read.points,
-        epochs=epochs,
-        coordinates=built.coordinates,
-        of_epoch=built.of_epoch,
-        shared=built.shared,
-        stable=stable,
-        times=times,
-    )
-
-
-def _epochs(read: terrestrial.EpochTable, kind: str, wanted: Wanted, findings: Findings) -> tuple[str, ...]:
-    """Return the epochs in order and refuse those that are not measured."""
-    known = read.epochs
-    if kind != "coordinates":  # the reference epoch has no rows of its own
-        later = read.epochs or (wanted.epochs[1:] if len(wanted.epochs) == FEWEST_EPOCHS else (SECOND,))
-        known = (*(wanted.epochs[:1] or (REFERENCE,)), *later)
-    epochs = wanted.epochs or tuple(dict.fromkeys(known))
-    for name, times in Counter(epochs).items():
-        if times > 1:
-            findings.add(Fault(f"epoch {name} is named {times} times", "duplicate", key="epochs", fix="remove one"))
-    if len(epochs) < FEWEST_EPOCHS:
-        message = f"has only one epoch, {epochs[0]}" if epochs else "has no epoch"
-        file, key = ("", "epochs") if wanted.epochs else (read.table.file, "epoch")
-        message = f"the list {message}" if wanted.epochs else message
-        findings.add(Fault(message, "one-epoch", file, key=key, expected="two or more"))
-    missing = [(number, name) for number, name in enumerate(epochs) if name not in known]
-    for number, name in missing:
-        near = suggestion(name, [each for each in known if each not in epochs])
-        message = f"{read.table.file} has no measurement of epoch {name}"
-        fix = near or f"its epochs are {listed(read.epochs)}"
-        findings.add(Fault(message, "not-measured", key=f"epochs[{number}]", fix=fix))
-    if kind != "coordinates" and epochs and epochs[0] in read.epochs:
-        row = int(np.flatnonzero(read.epoch == read.epochs.index(epochs[0]))[0])
-        message = f"epoch {epochs[0]} is the reference, against which pseudo-parallaxes are measured"
-        fix = "name the reference epoch first in `epochs`, and only later epochs in the table"
-        findings.add(read.table.fault(row, "epoch", message, "reference-epoch", fix=fix))
-    others = [name for name in read.epochs if name not in epochs]
-    if others and not missing:
-        rows = int(np.isin(read.epoch, [read.epochs.index(name) for name in others]).sum())
-        message = (
-            f"{read.table.file}: {counted(rows, 'row')} of epochs that the project does not name: {listed(others)}"
-        )
-        findings.notes.append(Note("epoch-not-used", message))
-    return epochs
-
-
-def _stable(read: terrestrial.EpochTable, stable: tuple[str, ...], findings: Findings) -> Flags:
-    """Mark the points that are taken not to move, and refuse those that are not measured."""
-    for number, name in enumerate(stable):
-        if name not in read.points:
-            message = f"{read.table.file} has no point {name}"
-            fix = suggestion(name, read.points) or "correct the id, or remove it"
-            findings.add(Fault(message, "not-measured", key=f"stable[{number}]", fix=fix))
-    return np.array([name in set(stable) for name in read.points], bool)
-
-
-class _Measured(NamedTuple):
-    """Coordinates and variances of a ``Series``."""
-
-    coordinates: Floats
-    of_epoch: Floats
-    shared: Floats
-
-
-def _from_coordinates(
-    read: terrestrial.EpochTable, table: SeriesUnits, centre: Floats, epochs: tuple[str, ...], findings: Findings
-) -> _Measured | None:
-    """Coordinates of each epoch have errors of their own and share none."""
-    sigma = _filled(read, ("sx", "sz"), table.sigma, "sigma", findings)
-    if sigma is None:
-        return None
-    number = locate(read.epochs, epochs)[read.epoch]
-    rows = np.flatnonzero(number >= 0)
-    shape = (len(epochs), len(read.points), len(SIDES), 2)
-    coordinates, of_epoch = np.full(shape, np.nan), np.ones(shape)
-    where = (number[rows], read.point[rows], read.side[rows])
-    flip = np.array([1.0, -1.0 if table.z_axis == "down" else 1.0])
-    scale = MILLIMETRES[table.unit]
-    coordinates[where] = read.table.columns("x", "z")[rows] * scale * flip - centre[read.side[rows]]
-    of_epoch[where] = (sigma[rows] * scale) ** 2
-    flat = (*shape[:2], 4)
-    return _Measured(coordinates.reshape(flat), of_epoch.reshape(flat), np.zeros(flat[1:]))
-
-
-def _from_pseudo_parallaxes(
-    read: terrestrial.EpochTable, table: SeriesUnits, centre: Floats, epochs: tuple[str, ...], findings: Findings
-) -> _Measured | None:
-    """Pseudo-parallaxes have errors of their own; those of the reference photos all epochs share."""
-    sigma = _filled(read, ("sigma",), table.sigma, "sigma", findings)
-    usual = table.sigma if table.sigma_d is None else table.sigma_d
-    sigma_d = _filled(read, ("sigma_d",), usual, "sigma_d", findings)
-    reference = terrestrial.reference_values(read, findings)
-    if sigma is None or sigma_d is None or findings.number(read.table.file):
-        return None
-    scale = MILLIMETRES[table.unit] * np.array([1.0, -1.0 if table.z_axis == "down" else 1.0] * 2)
-    x, z, p, q = reference.T
-    first = np.column_stack([x, z, x - p, z - q]) * scale - centre.ravel()
-    names = read.epochs or epochs[1:2] or (SECOND,)
-    number = locate(names, epochs)[read.epoch]
-    rows = np.flatnonzero(number >= 0)
-    shape = (len(epochs), len(read.points), 4)
-    coordinates, of_epoch = np.full(shape, np.nan), np.zeros(shape)
-    coordinates[0] = first
-    change = read.table.columns("dx", "dz", "dx_right", "dz_right")[rows] * scale
-    coordinates[number[rows], read.point[rows]] = first[read.point[rows]] + change
-    of_epoch[1:] = 1.0
-    of_epoch[number[rows], read.point[rows]] = (sigma_d[rows] * MILLIMETRES[table.unit]) ** 2
-    shared = np.zeros((len(read.points), 4))
-    shared[read.point[::-1]] = (sigma[::-1] * MILLIMETRES[table.unit]) ** 2  # the first row of a point counts
-    return _Measured(coordinates, of_epoch, shared)
-
-
-def _filled(
-    read: terrestrial.EpochTable, columns: tuple[str, ...], usual: float | None, key: str, findings: Findings
-) -> Floats | None:
-    """Give standard deviations row by row, in the unit of the table."""
-    sigma = read.table.columns(*columns)
-    missing = np.flatnonzero(np.isnan(sigma).any(axis=1))
-    if usual is not None:
-        return np.where(np.isnan(sigma), usual, sigma)
-    if len(missing):
-        number = counted(len(missing), "row has no standard deviation", "rows have no standard deviation")
-        names = ", ".join(columns)
-        message = f"{number} ({names}), and none is given for all"
-        fix = f"set `measurements.{key}` in the project, or fill the column {names}"
-        findings.add(read.table.fault(int(missing[0]), columns[0], message, "no-sigma", fix=fix))
-        return None
-    return sigma
-
-
-MOST_POINTS = 20_000  # of a table over the photo
-KILOMETRE = 1e6  # mm
-JENA = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
-# Standard deviations of a horizontal and of a vertical direction in one round, both faces, arcseconds. Those of Carl
-# Zeiss Jena have in their names the lateral error in mm at 1 km [Pollmer 1976], the T2 that of an angle in arcseconds,
-# which is the difference of two horizontal directions (GOST 10529).
-THEODOLITES = {
-    **{name: (size / KILOMETRE * ARCSECONDS,) * 2 for name, size in JENA.items()},
-    "T2": (2.0 / np.sqrt(2.0), 2.0),
-}
-USUAL_DIRECTION = 2.0  # arcseconds
-Angle = Annotated[Number, After(bounded(DEGREES))]
-Micrometres = Annotated[Number, After(bounded(IMAGE_SIGMA_UM))]
-Seconds = Annotated[Number, After(bounded(DIRECTION_SIGMA))]
-Level = Annotated[Number, After(bounded(SIGNIFICANCE))]
-Unit = Annotated[Words, After(one_of("mm", "um"))]
-SIGMA = "Standard deviation of x, z and the principal distance"
-
-
-class WithCamera(Section):
-    """What all of them have: the camera."""
-
-    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
+    photostrip_terrestrial: SchemaNumber = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     presets: Words | None = key("A list of cameras of your own", None)
+
+
+class WithCamera(CamerasFile):
+    """What all others of one camera have."""
+
     camera: CameraOrName = key("Camera: its name in a list, or preset, principal_distance, principal_point, format")
-    angles: Annotated[Words, After(one_of("deg", "gon"))] = key("Unit of angles and directions", "deg")
+    angles: AngleUnit = key("Unit of angles and directions", "deg")
 
 
 class Turned(Section):
@@ -553,12 +276,17 @@ class PhotoFile(Pointed):
     """Directions whose image points are wanted."""
 
 
-class AccuracyFile(Looking):
+class OverPhoto(Looking):
+    """A table over the whole photo."""
+
+    step: Step = key("Distance of the points of the table", 20.0, unit="mm")
+
+
+class AccuracyFile(OverPhoto):
     """How accurately correction directions must be measured, all over the photo."""
 
     sigma_um: Micrometres = key(SIGMA, 5.0, unit="um")
-    step: Annotated[Number, After(bounded(STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
-    as_printed: Flag = key("The formulas as the source prints them; for a level camera", False)  # noqa: FBT003
+    as_printed: Flag = key("The formulas as the source prints them; for a level camera", default=False)
     right: Turned | None = key("Where the camera at the right end of the base looks; default: as the left one", None)
 
     @property
@@ -585,14 +313,14 @@ class AccuracyFile(Looking):
 class Measuring(Section):
     """How well directions are measured."""
 
-    theodolite: Annotated[Words, After(one_of(*THEODOLITES))] | None = key(
+    theodolite: Annotated[str, choice(*THEODOLITES)] | None = key(
         f"Theodolite instead of `sigma_arcsec`: {', '.join(THEODOLITES)}", None
     )
     sigma_arcsec: Seconds | None = key(
         "Standard deviation of a direction in one round, both faces", None, unit="arcsec"
     )
     vertical_arcsec: Seconds | None = key("The same of a vertical one; default: as horizontal", None, unit="arcsec")
-    rounds: Annotated[Whole, After(bounded(Range(1, 10_000, "rounds")))] = key("Rounds measured", 1)
+    rounds: Annotated[Whole, Range(1, 10_000, "rounds")] = key("Rounds measured", 1)
 
     @rule
     def _one_precision(self) -> None:
@@ -607,11 +335,10 @@ class Measuring(Section):
         return Theodolite(horizontal, self.vertical_arcsec or vertical, self.rounds)
 
 
-class TheodoliteFile(Looking, Measuring):
+class TheodoliteFile(OverPhoto, Measuring):
     """Which image accuracy a theodolite can vouch for, all over the photo."""
 
     sigma_um: Micrometres | None = key("Image accuracy wanted: how many rounds it needs", None, unit="um")
-    step: Annotated[Number, After(bounded(STEP))] = key("Distance of the points of the table", 20.0, unit="mm")
 
     @rule
     def _has_a_precision(self) -> None:
@@ -624,16 +351,16 @@ class OrientationFile(WithCamera, Measuring):
     """A photo oriented by measured directions to points in it."""
 
     table: Words = key("Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]`, .csv or .csv.gz")
-    free: list[Annotated[Words, After(one_of(*FREE))]] = key(f"Determined besides the angles: {', '.join(FREE)}", [])
-    eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
+    free: list[Annotated[str, choice(*FREE)]] = key(f"Determined besides the angles: {', '.join(FREE)}", [])
+    eccentricity: Ahead = key(
         "Front nodal point ahead of the theodolite's axes; needs the column `distance`", 0.0, unit="m"
     )
-    refraction: Annotated[Number, After(bounded(REFRACTION))] = key(
+    refraction: Annotated[Number, Range(-10.0, 10.0)] = key(
         "Coefficient that computed directions lack; needs the column `distance`", 0.0
     )
     unit: Unit = key("Unit of image coordinates", "mm")
     sigma_um: Micrometres = key("Standard deviation of x and z", 5.0, unit="um")
-    screening: Annotated[Words, After(one_of(*SCREENINGS))] = key(
+    screening: Annotated[str, choice(*SCREENINGS)] = key(
         "Test points against the scatter of the others (`deletion`), the `stated` standard deviations, or not (`none`)",
         "deletion",
     )
@@ -642,11 +369,7 @@ class OrientationFile(WithCamera, Measuring):
     @property
     def settings(self) -> OrientationSettings:
         return OrientationSettings(
-            tuple(map(str, self.free)),
-            eccentricity=self.eccentricity,
-            refraction=self.refraction,
-            screening=str(self.screening),
-            significance=self.significance,
+            tuple(self.free), self.screening, self.significance, self.eccentricity, self.refraction
         )
 
 
@@ -662,12 +385,7 @@ class OneStationFile(Looking):
     significance: Level = key("Probability of calling a still point moved", 0.05)
 
 
-class CamerasFile(Section):
-    """Cameras that can be named."""
-
-    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
-    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
-    presets: Words | None = key("A list of cameras of your own", None)
+# ----------------------------------------------------------------------------- tables of a single photo
 
 
 class Points(NamedTuple):
@@ -677,16 +395,26 @@ class Points(NamedTuple):
     values: Floats  # (n, 2): coordinates x, z in mm, or directions lambda, beta in radians
 
 
+def refuse_outside(table: Table, unit: str, findings: Findings, angles: str = "deg") -> None:
+    """Refuse numbers of a table out of range, in its units of image coordinates and of angles; empty ones count not."""
+    for name, usual in LIMITS.items():
+        scale, label = (MILLIMETRES[unit], unit) if usual.unit == "mm" else (1.0, angles if usual is DEGREES else "")
+        limits, values = usual.scaled(scale, label), table.column(name)  # NaN where there is no such column
+        for row in np.flatnonzero(~np.isnan(values) & ~((values >= limits.least) & (values <= limits.most))):
+            message = f"{values[row]:g} is out of range"
+            findings.add(table.fault(int(row), name, message, "range", expected=str(limits)))
+
+
 def image_points(given: DirectionsFile, reading: Reading) -> Points:
     """Read image points, or raise every fault."""
     scale = MILLIMETRES[given.unit]
-    points, _ = _points(given, reading, IMAGE_POINTS, COORDINATE.scaled(scale, given.unit))
+    points, _ = _points(given, reading, IMAGE_POINTS, COORDINATE.scaled(scale, given.unit), given.unit)
     return points._replace(values=points.values * scale)
 
 
 def direction_points(given: PhotoFile, reading: Reading, camera: Phototheodolite) -> Points:
     """Read directions; refuse what the photo cannot show."""
-    points, table = _points(given, reading, DIRECTION_POINTS, DEGREES.scaled(1.0, given.angles))
+    points, table = _points(given, reading, DIRECTION_POINTS, DEGREES.scaled(1.0, given.angles), "mm")
     directions = points.values * RADIANS[given.angles]
     steep = np.abs(directions[:, 1]) > STEEPEST
     seen = photo_from_directions(directions, camera.principal_distance, given.attitude.rotation)
@@ -704,28 +432,90 @@ def direction_points(given: PhotoFile, reading: Reading, camera: Phototheodolite
     return points._replace(values=directions)
 
 
-def _points(given: Pointed, reading: Reading, layout: tuple, limits: Range) -> tuple[Points, Table | None]:  # type: ignore[type-arg]
+def _points(
+    given: Pointed, reading: Reading, layout: Sequence[Column], limits: Range, unit: str
+) -> tuple[Points, Table | None]:
     """Read points from one of the two sources, in the unit of the limits."""
-    names = [column.name for column in layout if column.number]
     table = None
     for path, findings in reading.named(("table",)):
         table = read_points(path, layout, findings)
         if table is not None:
-            refuse_outside(table, names, limits, findings)
+            refuse_outside(table, unit, findings, given.angles)
     for row, pair in enumerate(given.at):
         for column, value in enumerate(pair):
             if not limits.holds(value):
                 reading.refuse(("at", row, column), f"{value:g} is out of range", "range", expected=str(limits))
     reading.findings.stop()
     if table is not None:
+        names = [column.name for column in layout if column.number]
         return Points(tuple(table.cells("point")), table.columns(*names)), table
     return Points(tuple(map(str, range(1, len(given.at) + 1))), np.array(given.at).reshape(-1, 2)), None
 
 
-USUAL = MonitoringSettings()
-Coordinate = Annotated[Number, After(bounded(POSITION))]
-Three = tuple[Coordinate, Coordinate, Coordinate]
-Angle = Annotated[Number, After(bounded(DEGREES))]
+def read_sightings(
+    file: str, unit: str, angles: str, sigma: float, theodolite: Theodolite, findings: Findings
+) -> Sightings | None:
+    """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]``.
+
+    Standard deviations are in the unit of the coordinates and in seconds of arc, distances in metres. One of lambda and
+    beta may be empty. `sigma` (mm) and `theodolite` hold for rows without their own. None where there are faults.
+    """
+    read = read_points(file, SIGHTINGS, findings)
+    if read is None:
+        return None
+    scale, ids = MILLIMETRES[unit], tuple(read.cells("point"))
+    refuse_outside(read, unit, findings, angles)
+    directions = read.columns("lambda", "beta")
+    for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
+        if not findings.number(file):
+            message = f"neither direction to point {ids[row]} is given"
+            findings.add(read.fault(int(row), "lambda", message, "no-direction", expected="lambda, beta or both"))
+    steep = np.abs(np.nan_to_num(directions[:, 1])) * RADIANS[angles] > STEEPEST
+    for row in np.flatnonzero(steep):
+        message = f"{directions[row, 1]:g} {angles} is not below the zenith"
+        expected = "an elevation between -90 and 90 degrees, not a zenith distance"
+        findings.add(read.fault(int(row), "beta", message, "range", expected=expected))
+    image, angular = read.columns("sx", "sz") * scale, read.columns("s_lambda", "s_beta")
+    usual = np.array([theodolite.horizontal, theodolite.vertical]) / theodolite.rounds**0.5
+    return Sightings(
+        ids=ids,
+        xz=read.columns("x", "z") * scale,
+        directions=directions * RADIANS[angles],
+        sigma_xz=np.where(np.isnan(image), sigma, image),
+        sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
+        distances=read.columns("distance")[:, 0],
+    )
+
+
+def read_one_station(
+    file: str, given: OneStationFile, camera: Phototheodolite, findings: Findings
+) -> OneStation | None:
+    """Read ``point,x,z,dx,dz,distance[,distance_later][,sigma][,sigma_d][,sigma_distance]``; None with faults."""
+    read = read_points(file, ONE_STATION, findings)
+    if read is None:
+        return None
+    scale, ids = MILLIMETRES[given.unit], tuple(read.cells("point"))
+    refuse_outside(read, given.unit, findings)
+    for number, name in enumerate(given.stable):
+        if name not in ids:
+            message, fix = f"{file} has no point {shown(name)}", suggestion(name, ids)
+            findings.add(Fault(message, "unknown-point", key=f"stable[{number}]", fix=fix))
+    own = read.columns("sigma", "sigma_d", "sigma_distance") * [scale, scale, 1.0]
+    usual = (given.sigma_um / 1000, (given.sigma_d_um or given.sigma_um) / 1000, given.sigma_distance)
+    own = np.where(np.isnan(own), usual, own)
+    return OneStation(
+        points=ids,
+        first=read.columns("x", "z") * scale - camera.principal_point,
+        change=read.columns("dx", "dz") * scale,
+        sigma=own[:, 0],
+        sigma_change=own[:, 1],
+        distances=read.columns("distance", "distance_later"),
+        sigma_distance=own[:, 2],
+        stable=np.isin(ids, list(given.stable)),
+    )
+
+
+# ------------------------------------------------------------------------ keys of a survey of two stations
 
 
 def _short_epoch(value: object) -> object:
@@ -743,16 +533,14 @@ class Station(Section):
     """One of the two stations. Position and angles belong together; without them it is the normal case."""
 
     camera: Id = key("Camera, a key of `cameras`")
-    position: Three | None = key("Perspective centre in the order of `axes`", None, unit="m")
+    position: tuple[Metres, Metres, Metres] | None = key("Perspective centre in the order of `axes`", None, unit="m")
     directions: Words | None = key(
         "Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]` of correction directions that orient the"
         " photo of the first epoch, instead of the angles",
         None,
     )
-    sigma_arcsec: Annotated[Positive, After(bounded(DIRECTION_SIGMA))] = key(
-        "Standard deviation of these directions in rows without one", 2.0, unit="arcsec"
-    )
-    eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
+    sigma_arcsec: Seconds = key("Standard deviation of these directions in rows without one", 2.0, unit="arcsec")
+    eccentricity: Ahead = key(
         "Perspective centre ahead of `position` on the optical axis, where that is the theodolite's", 0.0, unit="m"
     )
     alpha: Angle | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
@@ -792,7 +580,7 @@ class Epoch(Section):
     """One epoch."""
 
     id: Id = key("Id of the epoch, as in the table")
-    time: Annotated[Number, After(bounded(TIME))] | None = key("Its time, for rates", None, unit="time_unit")
+    time: Annotated[Number, Range(-1e9, 1e9)] | None = key("Its time, for rates", None, unit="time_unit")
 
 
 class Measurements(Section):
@@ -802,7 +590,7 @@ class Measurements(Section):
     pseudo_parallaxes: Words | None = key(
         "Table `point[,epoch],x,z,p[,q],dx,dz,dx_right[,dz_right][,sigma][,sigma_d]`, .csv or .csv.gz", None
     )
-    unit: Annotated[Words, After(one_of("mm", "um"))] = key("Unit of the table: `mm` or `um`")
+    unit: Unit = key("Unit of the table: `mm` or `um`")
     z_axis: YAxis = key("Direction of z, `up` or `down`; x grows to the right", "up")
     sigma: Positive | None = key("Standard deviation of a coordinate in rows without one", None, unit="unit")
     sigma_d: Positive | None = key(
@@ -822,33 +610,33 @@ class Measurements(Section):
                 message = f"{value:g} {self.unit} is out of range"
                 raise wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
 
+    @property
+    def scale(self) -> Floats:
+        """Factors that bring x and z into millimetres, z up."""
+        return MILLIMETRES[self.unit] * np.array([1.0, -1.0 if self.z_axis == "down" else 1.0])
+
 
 class Processing(Section):
     """How displacements are tested."""
 
-    significance: Annotated[Number, After(bounded(SIGNIFICANCE))] = key(
-        "Probability of calling a point moved that did not move", USUAL.significance
-    )
-    moved_camera: Annotated[Words, After(one_of(*MOVED_CAMERA))] = key(
+    significance: Level = key("Probability of calling a point moved that did not move", USUAL.significance)
+    moved_camera: Annotated[str, choice(*MOVED_CAMERA)] = key(
         "Turn of a camera that the stable points show: taken out `always`, when significant (`auto`), or `never`",
         USUAL.moved_camera,
     )
 
 
-class TerrestrialFile(Section):
+class TerrestrialFile(CamerasFile):
     """Displacements from photos of two stations."""
 
-    photostrip_terrestrial: FirstSchema = key("Number of this schema: 1")
-    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the survey", "displacements")
-    presets: Words | None = key("A list of cameras of your own", None)
     cameras: Annotated[dict[Id, CameraOrName], length(1)] = key("Cameras by name")
     stations: Stations | None = key("The two stations; default: the normal case, with the only camera at both", None)
     axes: Annotated[Axes, After(_ground_axes)] | None = key(
         "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
     )
-    angle_unit: Annotated[Words, After(one_of("deg", "gon"))] = key("Unit of alpha, omega, kappa", "deg")
-    base: Annotated[Number, After(bounded(BASE))] | None = key(
+    angle_unit: AngleUnit = key("Unit of alpha, omega, kappa", "deg")
+    base: Annotated[Number, BASE] | None = key(
         "Base of the normal case, instead of positions and angles", None, unit="m"
     )
     epochs: list[Annotated[Epoch, Before(_short_epoch)]] | None = key(
@@ -873,10 +661,8 @@ class TerrestrialFile(Section):
             raise wrong("nothing says which camera stands where", code="missing-key", expected="`stations`")
         left, right = self.both
         if left.free != right.free:
-            side = "right" if left.free else "left"
-            raise wrong(
-                f"the {side} station has no position", code="missing-key", at="stations", expected="both or none"
-            )
+            message = f"the {'right' if left.free else 'left'} station has no position"
+            raise wrong(message, code="missing-key", at="stations", expected="both or none")
         if left.free and self.base is not None:
             raise wrong("the base follows from the positions of the stations", at="base", fix="remove it")
         if not left.free and self.base is None:
@@ -887,10 +673,6 @@ class TerrestrialFile(Section):
             raise wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
         if not left.free and self.axes is not None:
             raise wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
-
-
-USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none
-NORMAL_AXES = ("right", "ahead", "up")
 
 
 class ReportFrame(NamedTuple):
@@ -925,12 +707,12 @@ def load_survey(path: Path | None, overrides: Sequence[str] = ()) -> Survey:
     axes = given.axes or NORMAL_AXES
     east, north, up = (GROUND_AXES.index(each) if given.axes else number for number, each in enumerate(axes))
     return Survey(
-        name=str(given.name),
+        name=given.name,
         series=reading.complete(series),
         pair=_pair(given, cameras, reading),
-        settings=MonitoringSettings(given.processing.significance, str(given.processing.moved_camera)),
+        settings=MonitoringSettings(**dict(given.processing)),
         cameras=(cameras[0], cameras[1]),
-        frame=ReportFrame(axes, (east, north, up), str(given.time_unit)),
+        frame=ReportFrame(axes, (east, north, up), given.time_unit),
         files=tuple(reading.files),
         notes=tuple(reading.findings.notes),
     )
@@ -940,18 +722,14 @@ def _cameras(given: TerrestrialFile, reading: Reading) -> list[Phototheodolite]:
     """Return the cameras of both stations; fewer when one is at fault."""
     known = known_presets(reading)
     found = {
-        str(name): phototheodolite(str(name), each, known, reading, ("cameras", str(name)))
-        for name, each in given.cameras.items()
+        name: phototheodolite(name, each, known, reading, ("cameras", name)) for name, each in given.cameras.items()
     }
-    result = []
     for side, station in zip(SIDES, given.both, strict=True):
-        if station.camera in found:
-            result += [camera for camera in [found[station.camera]] if camera is not None]
-            continue
-        message = f"there is no camera `{station.camera}`"
-        expected, fix = f"one of {', '.join(found)}", suggestion(station.camera, found)
-        reading.refuse(("stations", side, "camera"), message, "unknown-camera", expected=expected, fix=fix)
-    return result
+        if station.camera not in found:
+            message = f"there is no camera `{station.camera}`"
+            expected, fix = f"one of {', '.join(found)}", suggestion(station.camera, found)
+            reading.refuse(("stations", side, "camera"), message, "unknown-camera", expected=expected, fix=fix)
+    return [camera for station in given.both if (camera := found.get(station.camera)) is not None]
 
 
 def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: Reading) -> StereoPair:
@@ -969,18 +747,12 @@ def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: R
 
 def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, reading: Reading) -> Floats:
     """Photo to ground of a station, from its angles or from the directions measured there."""
-    station = given.both[SIDES.index(side)]
-    unit = MILLIMETRES[str(given.measurements.unit)]
-    sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * unit
-    wanted = SightingUnits(
-        unit=str(given.measurements.unit),
-        angles=given.angle_unit,
-        sigma=sigma,
-        theodolite=Theodolite(station.sigma_arcsec, station.sigma_arcsec, 1),
-    )
+    station, unit = given.both[SIDES.index(side)], given.measurements.unit
+    sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * MILLIMETRES[unit]
+    theodolite = Theodolite(station.sigma_arcsec, station.sigma_arcsec, 1)
     sightings = None
     for path, findings in reading.named(("stations", side, "directions")):
-        sightings = read_sightings(path, wanted, findings)
+        sightings = read_sightings(path, unit, given.angle_unit, sigma, theodolite, findings)
     reading.findings.stop()
     if sightings is not None:
         settings = OrientationSettings(eccentricity=station.eccentricity)
@@ -989,28 +761,52 @@ def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, readin
     return ground_from_photo(*(scale * (angle or 0.0) for angle in (station.alpha, station.omega, station.kappa)))
 
 
+# --------------------------------------------------------------------------------- the table of all epochs
+
+
+class _Measured(NamedTuple):
+    """Coordinates and variances of a ``Series``."""
+
+    coordinates: Floats
+    of_epoch: Floats
+    shared: Floats
+
+
 def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[Phototheodolite]) -> Series | None:
-    """Read the table of measurements, whether or not the rest of the project is right."""
+    """Read the table of measurements, whether or not the rest of the project is right; None when there are faults.
+
+    It is brought into mm, reduced to the principal points, z up.
+    """
     node = reading.root.find("measurements")
-    measured = valid_section(Measurements, node) if node is not None else None
+    measured = None if node is None else valid_section(Measurements, node)
     if measured is None:
         return None
-    kind = "coordinates" if measured.coordinates is not None else "pseudo_parallaxes"
     centre = np.array([each.principal_point for each in cameras] if len(cameras) == len(SIDES) else np.zeros((2, 2)))
-    table = SeriesUnits(
-        kind=kind,
-        unit=str(measured.unit),
-        z_axis=measured.z_axis,
-        sigma=measured.sigma,
-        sigma_d=measured.sigma_d,
-    )
-    wanted, series = Wanted(), None
-    if given is not None:
-        epochs = tuple(str(each.id) for each in given.epochs or ())
-        wanted = Wanted(epochs, _times(given, reading), tuple(map(str, given.stable)))
-    for path, findings in reading.named(("measurements", kind)):
-        series = read_series(path, table, centre, wanted, findings)
-    return series
+    times, series = None if given is None else _times(given, reading), None
+    kind = "coordinates" if measured.coordinates is not None else "pseudo_parallaxes"
+    for file, findings in reading.named(("measurements", kind)):
+        series = _read_series(file, given, measured, centre, findings)
+    if series is None or times is None or len(times) != len(series.epochs):
+        return series
+    return replace(series, times=np.array(times))
+
+
+def _read_series(
+    file: str, given: TerrestrialFile | None, measured: Measurements, centre: Floats, findings: Findings
+) -> Series | None:
+    coordinates = measured.coordinates is not None
+    read = (terrestrial.read_coordinates if coordinates else terrestrial.read_pseudo_parallaxes)(file, findings)
+    if read is None or findings.number(file):
+        return None
+    refuse_outside(read.table, measured.unit, findings)
+    named = () if given is None else tuple(each.id for each in given.epochs or ())
+    epochs = _epochs(read, named, findings, coordinates=coordinates)
+    stable = _stable(read, () if given is None else given.stable, findings)
+    build = _from_coordinates if coordinates else _from_pseudo_parallaxes
+    built = build(read, measured, centre, epochs, findings)
+    if findings.number(file) or findings.number("") or built is None:
+        return None
+    return Series(read.points, epochs, *built, stable=stable)
 
 
 def _times(given: TerrestrialFile, reading: Reading) -> tuple[float, ...] | None:
@@ -1026,3 +822,118 @@ def _times(given: TerrestrialFile, reading: Reading) -> tuple[float, ...] | None
             message = f"the time {time:g} is not later than that of the epoch before, {before:g}"
             reading.refuse(("epochs", number, "time"), message, "order", expected="ascending times")
     return tuple(time for time in times if time is not None)
+
+
+def _epochs(
+    read: terrestrial.EpochTable, named: tuple[str, ...], findings: Findings, *, coordinates: bool
+) -> tuple[str, ...]:
+    """Return the epochs in order, the first being the reference, and refuse those that are not measured.
+
+    named: epochs in the order of the project; none: as they stand in the table.
+    """
+    known = read.epochs
+    if not coordinates:  # the reference epoch has no rows of its own
+        later = read.epochs or (named[1:] if len(named) == FEWEST_EPOCHS else (SECOND,))
+        known = (*(named[:1] or (REFERENCE,)), *later)
+    epochs = named or tuple(dict.fromkeys(known))
+    for name, times in Counter(epochs).items():
+        if times > 1:
+            findings.add(Fault(f"epoch {name} is named {times} times", "duplicate", key="epochs", fix="remove one"))
+    if len(epochs) < FEWEST_EPOCHS:
+        message = f"has only one epoch, {epochs[0]}" if epochs else "has no epoch"
+        file, key = ("", "epochs") if named else (read.table.file, "epoch")
+        message = f"the list {message}" if named else message
+        findings.add(Fault(message, "one-epoch", file, key=key, expected="two or more"))
+    missing = [(number, name) for number, name in enumerate(epochs) if name not in known]
+    for number, name in missing:
+        near = suggestion(name, [each for each in known if each not in epochs])
+        message = f"{read.table.file} has no measurement of epoch {name}"
+        fix = near or f"its epochs are {listed(read.epochs)}"
+        findings.add(Fault(message, "not-measured", key=f"epochs[{number}]", fix=fix))
+    if not coordinates and epochs and epochs[0] in read.epochs:
+        row = int(np.flatnonzero(read.epoch == read.epochs.index(epochs[0]))[0])
+        message = f"epoch {epochs[0]} is the reference, against which pseudo-parallaxes are measured"
+        fix = "name the reference epoch first in `epochs`, and only later epochs in the table"
+        findings.add(read.table.fault(row, "epoch", message, "reference-epoch", fix=fix))
+    others = [name for name in read.epochs if name not in epochs]
+    if others and not missing:
+        rows = int(np.isin(read.epoch, [read.epochs.index(name) for name in others]).sum())
+        message = (
+            f"{read.table.file}: {counted(rows, 'row')} of epochs that the project does not name: {listed(others)}"
+        )
+        findings.notes.append(Note("epoch-not-used", message))
+    return epochs
+
+
+def _stable(read: terrestrial.EpochTable, stable: Sequence[str], findings: Findings) -> Flags:
+    """Mark the points that are taken not to move, and refuse those that are not measured."""
+    for number, name in enumerate(stable):
+        if name not in read.points:
+            message = f"{read.table.file} has no point {name}"
+            fix = suggestion(name, read.points) or "correct the id, or remove it"
+            findings.add(Fault(message, "not-measured", key=f"stable[{number}]", fix=fix))
+    return np.array([name in set(stable) for name in read.points], bool)
+
+
+def _from_coordinates(
+    read: terrestrial.EpochTable, given: Measurements, centre: Floats, epochs: tuple[str, ...], findings: Findings
+) -> _Measured | None:
+    """Coordinates of each epoch have errors of their own and share none."""
+    sigma = _filled(read, ("sx", "sz"), given.sigma, "sigma", findings)
+    if sigma is None:
+        return None
+    number = locate(read.epochs, epochs)[read.epoch]
+    rows = np.flatnonzero(number >= 0)
+    shape = (len(epochs), len(read.points), len(SIDES), 2)
+    coordinates, of_epoch = np.full(shape, np.nan), np.ones(shape)
+    where = (number[rows], read.point[rows], read.side[rows])
+    coordinates[where] = read.table.columns("x", "z")[rows] * given.scale - centre[read.side[rows]]
+    of_epoch[where] = (sigma[rows] * given.scale) ** 2
+    flat = (*shape[:2], 4)
+    return _Measured(coordinates.reshape(flat), of_epoch.reshape(flat), np.zeros(flat[1:]))
+
+
+def _from_pseudo_parallaxes(
+    read: terrestrial.EpochTable, given: Measurements, centre: Floats, epochs: tuple[str, ...], findings: Findings
+) -> _Measured | None:
+    """Pseudo-parallaxes have errors of their own; those of the reference photos all epochs share."""
+    sigma = _filled(read, ("sigma",), given.sigma, "sigma", findings)
+    usual = given.sigma if given.sigma_d is None else given.sigma_d
+    sigma_d = _filled(read, ("sigma_d",), usual, "sigma_d", findings)
+    reference = terrestrial.reference_values(read, findings)
+    if sigma is None or sigma_d is None or findings.number(read.table.file):
+        return None
+    scale = np.tile(given.scale, 2)
+    x, z, p, q = reference.T
+    first = np.column_stack([x, z, x - p, z - q]) * scale - centre.ravel()
+    names = read.epochs or epochs[1:2] or (SECOND,)
+    number = locate(names, epochs)[read.epoch]
+    rows = np.flatnonzero(number >= 0)
+    shape = (len(epochs), len(read.points), 4)
+    coordinates, of_epoch = np.full(shape, np.nan), np.zeros(shape)
+    coordinates[0] = first
+    change = read.table.columns("dx", "dz", "dx_right", "dz_right")[rows] * scale
+    coordinates[number[rows], read.point[rows]] = first[read.point[rows]] + change
+    of_epoch[1:] = 1.0
+    of_epoch[number[rows], read.point[rows]] = (sigma_d[rows] * scale[0]) ** 2
+    shared = np.zeros((len(read.points), 4))
+    shared[read.point[::-1]] = (sigma[::-1] * scale[0]) ** 2  # the first row of a point counts
+    return _Measured(coordinates, of_epoch, shared)
+
+
+def _filled(
+    read: terrestrial.EpochTable, columns: tuple[str, ...], usual: float | None, key: str, findings: Findings
+) -> Floats | None:
+    """Give standard deviations row by row, in the unit of the table."""
+    sigma = read.table.columns(*columns)
+    missing = np.flatnonzero(np.isnan(sigma).any(axis=1))
+    if usual is not None:
+        return np.where(np.isnan(sigma), usual, sigma)
+    if len(missing):
+        number = counted(len(missing), "row has no standard deviation", "rows have no standard deviation")
+        names = ", ".join(columns)
+        message = f"{number} ({names}), and none is given for all"
+        fix = f"set `measurements.{key}` in the project, or fill the column {names}"
+        findings.add(read.table.fault(int(missing[0]), columns[0], message, "no-sigma", fix=fix))
+        return None
+    return sigma

@@ -8,26 +8,24 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
-from photostrip.formats.text.numbers import LARGEST_NUMBER
+from photostrip.formats.faults import LARGEST_NUMBER
 from photostrip.project.reading import read_file
 from photostrip.project.sections import (
-    After,
     Flag,
     NotNegative,
     Range,
+    SchemaNumber,
     Section,
     Whole,
     Words,
-    bounded,
     key,
-    schema_number,
 )
 
 USUAL = Tolerances()
 T = TypeVar("T", bound=Section)
 
 
-Count = Annotated[Whole, After(bounded(Range(0, LARGEST_NUMBER, "")))]
+Count = Annotated[Whole, Range(0, LARGEST_NUMBER, "")]
 
 
 class Absolute(Section):
@@ -60,9 +58,6 @@ class Members(Section):
 def _usual(kind: type[T], usual: Tolerance | SetTolerance) -> T:
     """Return a section that holds the defaults."""
     return kind.model_construct(**{name: getattr(usual, name) for name in kind.model_fields})
-
-
-SchemaNumber = Annotated[int, schema_number("photostrip_tolerances", " of tolerances")]
 
 
 class ToleranceFile(Section):

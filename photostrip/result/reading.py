@@ -131,6 +131,8 @@ def _alike(column: list[Any], entry: Quantity | None) -> bool:
     present = [value for value in column if value is not None]
     if kinds == {str}:
         return _is("".join(present), entry.kind)
+    if kinds == {int} and entry.kind == "flag":
+        return {*present} <= {0, 1}
     if kinds in ({float}, {int}):
         largest = float(np.abs(np.array(present, float)).max()) if kinds == {float} else max(map(abs, present))
         return _is(largest, entry.kind)
@@ -179,6 +181,8 @@ def _is(value: object, kind: str) -> bool:
         return kind in {"text", "word", "any"} and not unwritable(value)
     if isinstance(value, bool):
         return kind in {"flag", "any"}
+    if kind == "flag":
+        return value in (0, 1)
     most = LARGEST_COUNT if kind == "count" else LARGEST_NUMBER
     return kind in {"count", "number", "any"} and isinstance(value, int) and -most <= value <= most
 

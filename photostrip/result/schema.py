@@ -28,14 +28,17 @@ def result_schema() -> dict[str, Any]:
 def result_page() -> str:
     """Return a page of Markdown with every key, its unit and its meaning."""
     lines = ["| key | unit | what it is |", "|---|---|---|"]
-    lines += [f"| `{path}` | {_unit(each)} | {each.meaning} |" for path, each in _quantities(described(), "")]
+    for path, entry in _quantities(described(), ""):
+        absent = " (in CSV and Python: other columns of result.json tell it)" if entry.derived else ""
+        lines.append(f"| `{path}` | {_unit(entry)} | {entry.meaning}{absent} |")
     return "\n".join(lines) + "\n"
 
 
 def _block(block: Block, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
     """Describe a block of keys or columns; what lies below it goes into `blocks` by the keys that lead to it."""
     if isinstance(block, Columns):
-        columns = {key: {"type": "array", "items": _value(entry)} for key, entry in block.items()}
+        stored = {key: entry for key, entry in block.items() if not entry.derived}
+        columns = {key: {"type": "array", "items": _value(entry) | _flag(entry)} for key, entry in stored.items()}
         required = [key for key, entry in block.items() if not entry.optional]
         return {"type": "object", "properties": columns, "required": required}
     found: dict[str, Any] = {}
@@ -48,6 +51,11 @@ def _block(block: Block, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
             one = {"$ref": f"#/$defs/{path}"}
             found[key] = {"anyOf": [one, {"type": "null"}]} if entry.optional else one
     return {"type": "object", "properties": found}
+
+
+def _flag(entry: Quantity) -> dict[str, Any]:
+    """Describe a flag in a table: 1 or 0."""
+    return {"type": ["integer", "null"], "enum": [0, 1, None]} if entry.kind == "flag" else {}
 
 
 def _value(entry: Quantity) -> dict[str, Any]:

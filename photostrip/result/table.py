@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, block_at
-from photostrip.result.numbers import plain
-from photostrip.result.quantities import angle_decimals, coordinate_decimals, rounded_column
+from photostrip.result.numbers import angle_decimals, coordinate_decimals, plain, rounded_column
 
 SHOWN = 10  # rows in a notebook
 TEXTS = {"text", "word"}
@@ -146,12 +145,17 @@ class Table:
         return self._with(self._columns | {key: others[key] for key in others.columns})
 
     def in_frame(self, frame: Document, angles: Document) -> Self:
-        """Return the table with the units and decimals of coordinates and angles that its result has."""
+        """Return the table with the units, decimals and axes of coordinates and angles that its result has."""
         lengths = dict(zip("xyz", coordinate_decimals(frame), strict=True))
         known = dict(zip("xyz", (frame["plan_unit"], frame["plan_unit"], frame["height_unit"]), strict=True))
+        axes = dict(zip("xyz123", (*frame["axes"], *frame["axes"]), strict=True))
         entries = dict(self.quantities)
         for name, entry in entries.items():
-            if entry.unit == "frame":
+            if "*" in entry.head:
+                entries[name] = replace(entry, head=entry.head.replace("*", axes[name[-1]]))
+            elif entry.unit in {"deg", "arcsec"}:
+                entries[name] = replace(entry, angles=angles["unit"])
+            elif entry.unit == "frame":
                 entries[name] = replace(entry, unit=UNITS.get(known[name], known[name]), decimals=lengths[name])
             elif entry.unit == "angle":
                 decimals = angle_decimals(angles["unit"]) if entry.digits is None else None
@@ -211,14 +215,21 @@ def as_array(entry: Quantity, values: Sequence[Any] | NDArray[Any]) -> NDArray[A
         return np.array(values, kind)  # None becomes NaN
     if kind is int:
         return np.array(values, float)
+    if kind is bool:
+        return np.fromiter((None if value is None else bool(value) for value in values), object, len(values))
     return np.fromiter(values, object, len(values))
 
 
 def in_frame(document: Document) -> Document:
     """Give the tables of a document the units and decimals of its coordinates and angles."""
     frame, angles = document["frame"], document["angles"]
-    tables = {key: value.in_frame(frame, angles) for key, value in document.items() if isinstance(value, Table)}
-    return document | tables
+
+    def placed(value: Any) -> Any:  # noqa: ANN401 (any part of a document)
+        if isinstance(value, Table):
+            return value.in_frame(frame, angles)
+        return {key: placed(each) for key, each in value.items()} if isinstance(value, dict) else value
+
+    return {key: placed(value) for key, value in document.items()}
 
 
 def _is_column(value: object) -> bool:
@@ -242,8 +253,19 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[Document]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
+def stored(table: Table) -> dict[str, list[Any]]:
+    """Return the columns of a table that stand in result.json, flags as 1 and 0."""
+    found = {}
+    for name in table.columns:
+        entry, column = table.quantities[name], table.values(name)
+        if not entry.derived:
+            is_flag = entry.kind == "flag"
+            found[name] = [None if value is None else int(value) for value in column] if is_flag else column
+    return found
+
+
 def plain_of(value: Any) -> Any:  # noqa: ANN401 (any part of a document)
     """Return a document as JSON has it: its tables as blocks of lists."""
     if isinstance(value, dict):
         return {key: plain_of(each) for key, each in value.items()}
-    return {name: value.values(name) for name in value.columns} if isinstance(value, Table) else value
+    return stored(value) if isinstance(value, Table) else value

@@ -15,11 +15,13 @@ from photostrip.geometry.similarity import Similarity, pair_scales
 from photostrip.notes import counted
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.report.page.parts import Facts, Part, Words
+from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, written
+from photostrip.sheets.sheet import Fact, Rows, Sheet, constant, hidden, listed
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
+from photostrip.strip.pair_screening import stages, tested
 from photostrip.strip.polynomial import POWERS, degree_of
 from photostrip.strip.relative_orientation import ELEMENTS
 
@@ -30,6 +32,7 @@ PAIRED = 15  # control points whose 105 distances can still be read
 PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")
 TURNS, TURN_HEADS = ("alpha", "omega", "kappa"), ("α", "ω", "κ")
 SIMILARITY, SIMILARITY_HEADS = ("xi", "eta", "theta"), ("ξ", "η", "θ")
+TESTS = {"parallax": "|q|, mm,", "grubbs": "Grubbs' G", "tau": "tau"}
 SYMBOLS = {
     "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
     "alpha1 to kappa2": "elements of relative orientation in the base frame, written with a prime",
@@ -212,31 +215,20 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
         title = f"Relative orientation of {names[1]} – {names[2]}"
         for count, each in enumerate(rounds, 1):
             yield _round(names, each, count, unit, title if count == 1 else "")
-        yield Rows(
+        yield listed(
             "pair_rejected",
             "",
             (
-                *who,
-                Field("point", head="rejected"),
+                *constant(strip=names[0], left=names[1], right=names[2]),
+                Field("point", head="rejected", of=lambda each: ids[orientation.point[each.row]]),
                 Field("test"),
                 *fields("value limit", "ratio g4"),
-                Field("q", "mm 4"),
-                Field("readmitted", head=""),
+                Field("q", "mm 4", of="worst"),
+                Field("readmitted", head="", of=lambda at: Cell("taken back" if at.readmitted else "", at.readmitted)),
             ),
-            [
-                (
-                    *names,
-                    ids[orientation.point[each.row]],
-                    each.test,
-                    each.value,
-                    each.limit,
-                    each.worst,
-                    Cell("taken back" if each.readmitted else "", bool(each.readmitted)),
-                )
-                for each in strip.of_photos.rejections
-                if orientation.pairs.pair[each.row] == number
-            ],
+            [each for each in strip.of_photos.rejections if orientation.pairs.pair[each.row] == number],
         )
+        yield from _largest(result, strip, number, names)
         base = (bases[number] * formed.first.base).tolist()
         angles = [*(np.array(base_angles(bases[number])) * factor).tolist(), *_turned(rotations[number], factor)]
         told = ", ".join(f"{name} {value:z.6f}" for name, value in zip(own[0], base, strict=True))
@@ -254,6 +246,20 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
             ),
         )
         yield _points(result, strip, number, names)
+
+
+def _largest(result: Result, strip: StripResult, number: int, names: tuple[str, ...]) -> Iterator[Rows]:
+    """Give the largest value of each test of single residuals that is left in a pair, beside its limit."""
+    orientation, ids = strip.of_photos.orientation, result.refined.observations.point_ids
+    rows = orientation.pairs.rows_of(np.array([number]))
+    tests = []
+    for test, bound in stages(result.settings.relative, strip.of_photos.sigma):
+        value, limit, _ = (each[rows] for each in tested(orientation, test, bound))
+        worst = int(np.argmax(np.where(orientation.used[rows], value, -np.inf)))
+        tests.append((*names, test, ids[orientation.point[rows[worst]]], value[worst], limit[worst]))
+    said = [f"{TESTS[test]} {value:.4g} at {point}, limit {limit:.4g}" for *_, test, point, value, limit in tests]
+    columns = (*hidden("strip", "left", "right", "test", "point"), *hidden("value", "limit", form="ratio g5"))
+    yield Rows("pair_tests", "", columns, tests, above=[f"What is left: {'; '.join(said)}."] if said else [])
 
 
 def _round(names: tuple[str, ...], each: PairRound, count: int, unit: str, title: str) -> Rows:
@@ -486,34 +492,19 @@ def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
     corrected = found(xyz)
     given = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate).of(corrected)
     who = hidden("strip")
-    yield Rows(
+    yield listed(
         "polynomial_evidence",
         f"Polynomials of strip {name}, eq. 150-151",
         (
-            *who,
-            *hidden("found"),
+            *constant(strip=name, found=found.degree),
             Field("group"),
             Field("degree", "count"),
-            Field("rms", "m 4"),
-            Field("left_out", "m 4"),
-            Field("F", " g4"),
+            *fields("rms left_out", "m 4"),
+            Field("F", " g4", of="f"),
             Field("p", " g3"),
-            Field("taken", head=""),
+            Field("taken", head="", of=lambda each: Cell("taken" if each.accepted else "", bool(each.accepted))),
         ),
-        [
-            (
-                name,
-                found.degree,
-                each.group,
-                each.degree,
-                each.rms,
-                each.left_out,
-                each.f,
-                each.p,
-                Cell("taken" if each.accepted else "", bool(each.accepted)),
-            )
-            for each in found.evidence
-        ],
+        found.evidence,
     )
     terms = [
         (name, axis, *row, fit.sigma0)

@@ -31,4 +31,9 @@ StepName = Literal[
     "polynomial",
     "resection",
     "bundle",
+    "frame",
+    "curvature",
+    "pair-scales",
+    "closed-form",
+    "deformation",
 ]  # that can be taken alone

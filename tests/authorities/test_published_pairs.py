@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.geometry.rotation import angles, from_alpha_omega_kappa
+from photostrip.geometry.rotation import about, angles, from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity
 from photostrip.strip.formed_strip import intersect, model_points
 from photostrip.strip.relative_orientation import collect_pairs, orient_pairs
-from tests.attitudes import rotation_x, rotation_y, rotation_z
 from tests.strips import MICROMETRE, measured
 
 if TYPE_CHECKING:
@@ -100,7 +99,7 @@ def test_no_angle_may_change_its_sign(photo: int, kind: int) -> None:
 def test_no_other_order_of_rotation_will_do() -> None:
     variant = Variant()
     alpha, omega, kappa = variant.angles.T
-    _, parallax = variant.intersect(rotation_x(omega) @ rotation_y(-alpha) @ rotation_z(kappa))
+    _, parallax = variant.intersect(about(0, omega) @ about(1, -alpha) @ about(2, kappa))
     assert np.abs(parallax).max() == pytest.approx(25 * MICROMETRE, rel=0.05)
 
 

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from photostrip import comparison
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances, baseline_of
-from photostrip.comparison.ground import plan_and_height
-from photostrip.comparison.tolerances import UNITS
+from photostrip.comparison.comparison import UNITS
 from photostrip.errors import InputError
 from photostrip.library.comparison import compare
-from photostrip.result.quantities import MATRIX
+from photostrip.result.distances import plan_and_height
+from photostrip.result.numbers import MATRIX
 from tests.loops import nonempty
 from tests.results import by_rows, case, in_tables, rotation
 
@@ -125,7 +125,7 @@ def test_a_given_point_that_counts_in_plan_only_is_compared_in_plan() -> None:
 
 def test_the_short_form_leaves_out_single_measurements_only() -> None:
     document = case().document
-    left_out = {"version", "statement", "residuals", "parallaxes", "covariances"}
+    left_out = {"version", "statement", "residuals", "correlations"}
     assert document.keys() - baseline_of(document).keys() == left_out
 
 

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.result.table import rows_of
 from tests.loops import nonempty
 from tests.results import columns_of, rotation

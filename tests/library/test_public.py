@@ -29,7 +29,7 @@ MEMBERS = {
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
         "accuracy", "computed", "control", "covariance_of", "crs", "document", "files", "findings",
-        "name", "notes", "pairs", "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals",
+        "name", "notes", "pairs", "photos", "pictures", "points", "rejected", "report", "residuals",
         "statement", "status", "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],
@@ -39,12 +39,13 @@ MEMBERS = {
     ],
 }  # fmt: skip
 STEPS = [
-    "absolute", "bundle", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection",
-    "scale_transfer", "strip",
+    "absolute", "angles", "bundle", "chain", "closed_form", "curvature", "deformation", "frame", "from_angles",
+    "interior", "intersection", "pair_scales", "polynomial", "refine", "relative", "resection", "scale_transfer",
+    "strip",
 ]  # fmt: skip
 STEP_VALUES = [
-    "Absolute", "Bundle", "Camera", "Distortion", "Interior", "Intersection", "OrientedPhoto", "Relative",
-    "Strip",
+    "Absolute", "Bundle", "Camera", "ClosedForm", "Distortion", "Frame", "Interior", "Intersection", "OrientedPhoto",
+    "PairScales", "Paraboloid", "Relative", "Strip",
 ]  # fmt: skip
 ERRORS = ["GeometryError", "InputError", "PhotostripError"]
 

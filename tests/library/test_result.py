@@ -46,7 +46,7 @@ def test_a_result_says_its_verdict(result: photostrip.Result) -> None:
     assert "<td>check</td><td>height</td><td>30</td><td>0.138</td>" in page
 
 
-@pytest.mark.parametrize("name", ["points", "photos", "residuals", "parallaxes", "rejected"])
+@pytest.mark.parametrize("name", ["points", "photos", "residuals", "rejected"])
 def test_tables_are_those_of_the_files(result: photostrip.Result, name: str) -> None:
     head, *rows = csv.reader(result.files()[f"{name}.csv"].splitlines())
     table = getattr(result, name)
@@ -73,7 +73,7 @@ def test_columns_know_their_unit_and_kind(result: photostrip.Result) -> None:
 
 
 def test_every_column_of_every_table_has_a_meaning(result: photostrip.Result, bundle: photostrip.Result) -> None:
-    for name in ("points", "photos", "pairs", "strips", "control", "residuals", "parallaxes", "findings", "notes"):
+    for name in ("points", "photos", "pairs", "strips", "control", "residuals", "findings", "notes"):
         for found in (result, bundle):
             table = getattr(found, name)
             assert [column for column in table.columns if not table.meanings[column]] == [], name
@@ -131,8 +131,8 @@ def test_columns_without_values_keep_their_kind() -> None:
 
 def test_a_table_shows_itself(result: photostrip.Result) -> None:
     assert repr(result.residuals) == (
-        "<residuals: 469 rows; strip, photo, point, vx_um [um], vy_um [um], used, redundancy_x, redundancy_y, test_x, "
-        "test_y, detectable_x_um [um], detectable_y_um [um]>"
+        "<residuals: 469 rows; photo, point, vx_um [um], vy_um [um], used, q_um [um], zone, redundancy_x, "
+        "redundancy_y, test_x, detectable_x_um [um], test_y, detectable_y_um [um]>"
     )
     page = result.residuals._repr_html_()
     assert page.count("<tr>") == 11

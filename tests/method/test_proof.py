@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from pyproj import Proj
+from scipy.spatial.transform import Rotation
 
 from photostrip.camera import Camera, Distortion
 from photostrip.network.problem import BundleSettings
@@ -38,7 +39,6 @@ from photostrip.simulation import (
     simulate,
 )
 from photostrip.strip import polynomial
-from tests.attitudes import angle_between
 from tests.loops import nonempty
 from tests.results import rotation
 from tests.simulated import inputs_of, settings_of
@@ -91,10 +91,11 @@ class Recovery:
     @property
     def rotations(self) -> float:
         """Largest angle between a photo's orientation and the true one, radians."""
-        return max(
-            float(angle_between(strip.intermediate.cartesian_rotations(strip.resection.rotations), true).max())
-            for strip, true in zip(self.result.strips, self._of_photos(self.simulation.truth.rotations), strict=True)
-        )
+        found = [strip.intermediate.cartesian_rotations(strip.resection.rotations)
+                 for strip in self.result.strips]  # fmt: skip
+        true = self._of_photos(self.simulation.truth.rotations)
+        turns = [np.swapaxes(one, -1, -2) @ other for one, other in zip(found, true, strict=True)]
+        return max(float(Rotation.from_matrix(turn).magnitude().max()) for turn in turns)
 
     def _of_photos(self, values: Floats) -> list[Floats]:
         """True values by strip."""

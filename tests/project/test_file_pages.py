@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.formats.measured.control import read_control
-from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings
+from photostrip.formats.faults import Findings
+from photostrip.formats.measured import Manner, read_control, read_measurements
 from photostrip.project.keys import ProjectFile
 from photostrip.project.reading import checked, parse
 from tests.pages import blocks

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.formats.text.findings import Findings
+from photostrip.formats.faults import Findings
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, keys_page, schema_of
 from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances

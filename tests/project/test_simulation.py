@@ -157,7 +157,7 @@ def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
         ("flight: {heading: 3}", "2:10: flight.heading", "the key `heading` is not known; did you mean `heading_deg`?"),
         ("flight: {photos: 2.5}", "2:18: flight.photos", "2.5 is not a whole number; expected a whole number"),
         ("flight: {photos: ten}", "2:18: flight.photos", "`ten` is not a number; expected a whole number"),
-        ("flight: {photos: [1]}", "2:18: flight.photos", "no number is given here; expected a whole number"),
+        ("flight: {photos: [1]}", "2:18: flight.photos", "a list is given here; expected a whole number"),
         ("flight: 3", "2:9: flight", "a single value is given here; expected a mapping (lines `key: value`)"),
         ("control: {sigma: [1, 2]}", "2:18: control.sigma", "2 values in the list; expected 3 values"),
         (
@@ -213,7 +213,7 @@ def test_the_number_of_the_schema_is_asked_for(tmp_path: Path) -> None:
     )
     (other,) = messages(tmp_path, "photostrip_simulation: 2\n")
     assert other == (
-        "spec.yaml:1:24: photostrip_simulation: this version of photostrip does not read schema 2 of simulations;"
+        "spec.yaml:1:24: photostrip_simulation: this version of photostrip does not read schema 2;"
         " expected photostrip_simulation: 1"
     )
 

@@ -11,7 +11,7 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.project.reading import read_keys
-from photostrip.project.terrestrial import CamerasFile, known_presets, load_survey, own_presets
+from photostrip.project.terrestrial import CamerasFile, known_presets, load_survey
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
@@ -172,7 +172,7 @@ def test_reference_coordinates_may_stand_once(tmp_path: Path) -> None:
 
 
 def test_the_cameras_of_the_source_are_there() -> None:
-    known = own_presets()
+    known = known_presets()
     assert (known["Photheo 19/1318"].principal_distance, known["UMK 10/1318"].principal_distance) == (190.0, 100.0)
     assert known["UMK 10/1318"].format == (160.0, 120.0)
 
@@ -208,7 +208,10 @@ def test_a_list_of_the_user_adds_and_replaces(tmp_path: Path) -> None:
     ("text", "expected"),
     [
         ("cameras: {}\n", ["mine.yaml:1:1: photostrip_cameras: `photostrip_cameras` is missing", "there is no camera"]),
-        ("photostrip_cameras: 2\ncameras: {A: {principal_distance: 1}}\n", ["mine.yaml:1:21: photostrip_cameras: `2`"]),
+        (
+            "photostrip_cameras: 2\ncameras: {A: {principal_distance: 1}}\n",
+            ["mine.yaml:1:21: photostrip_cameras: this"],
+        ),
         (
             "photostrip_cameras: 1\ncameras:\n  A: {principal_distance: -3}\n  B: {principal_distanc: 3}\n",
             ["mine.yaml:3:27: cameras.A.principal_distance: -3 is out of range", "mine.yaml:4:", "did you mean"],
@@ -233,7 +236,7 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("terrestrial: 1", "terrestrial: 2", "survey.yaml:1:25: photostrip_terrestrial: `2` is not known; expected 1"),
+        ("terrestrial: 1", "terrestrial: 2", "survey.yaml:1:25: photostrip_terrestrial: this version of photostrip does not read schema 2; expected photostrip_terrestrial: 1"),
         ("camera: long", "camera: lnog", "survey.yaml:8:18: stations.left.camera: there is no camera `lnog`; expected one of long, wide; did you mean `long`?"),
         ("preset: UMK 10/1318", "preset: UMK 10", "survey.yaml:5:18: cameras.wide.preset: there is no preset `UMK 10`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `UMK 10/1318`?"),
         ("{preset: UMK 10/1318}", "{principal_point: [0, 0]}", "survey.yaml:5:9: cameras.wide: nothing says what the camera is; expected `preset`, or `principal_distance` in mm"),

@@ -19,7 +19,7 @@ from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel,
 from photostrip.report.pictures.footprints import footprint_pictures, footprints
 from photostrip.report.pictures.places import plan_of, rays_of
 from photostrip.report.pictures.result import picture_files, pictures_of
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.simulation import Models
 from photostrip.simulation.flight import surface
 from photostrip.simulation.simulation import simulate
@@ -135,7 +135,7 @@ def test_points_that_findings_name_have_a_ring_and_their_id() -> None:
 
 def test_parallaxes_have_the_mean_of_their_zone() -> None:
     document = case().document
-    sizes = document["parallaxes"].where(used=True, zone=1)["q_um"]
+    sizes = document["residuals"].where(zone=1)["q_um"]
     assert f"zone 1, left centre: {np.mean(sizes):+.1f} ± " in drawn(document, "parallaxes")
 
 

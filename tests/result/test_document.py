@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.document import document_of
-from photostrip.result.numbers import natural, rounded, significant
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX, natural, rounded, significant
 from photostrip.result.summary import TOLERANCES, counts_of
 from photostrip.result.table import Table, plain_of
 from photostrip.simulation.simulation import simulate
@@ -378,8 +377,9 @@ def test_the_ratio_counts_the_point_and_the_model() -> None:
 
 def test_sigma0_follows_from_the_parallaxes() -> None:
     document = case("projected", 2).document
-    used = document["parallaxes"].where(used=True)
-    squares = float((used["q_um"] ** 2).sum())
+    parallaxes = document["residuals"]["q_um"]
+    used = parallaxes[np.isfinite(parallaxes)]
+    squares = float((used**2).sum())
     redundancy = len(used) - 5 * len(document["models"])
     assert document["summary"]["redundancy"] == redundancy
     assert document["summary"]["sigma0_um"] == pytest.approx(math.sqrt(squares / 2 / redundancy), abs=0.02)
@@ -389,10 +389,9 @@ def test_sigma0_follows_from_the_parallaxes() -> None:
 def test_models_are_summed_up_from_their_parallaxes() -> None:
     document = case("projected", 2).document
     for model in nonempty(document["models"]):
-        pair = document["parallaxes"].where(strip=model["strip"], left=model["left"], right=model["right"])
-        used = {row["point"]: row["q_um"] for row in pair if row["used"]}
+        rays = document["residuals"].where(photo=model["left"])
+        used = {ray["point"]: ray["q_um"] for ray in rays if ray["q_um"] is not None}
         assert model["points_used"] == len(used)
-        assert model["points_rejected"] == len(pair) - len(used)
         assert model["max_parallax_um"] == max(map(abs, used.values()))
         assert abs(used[model["max_parallax_point"]]) == model["max_parallax_um"]
         assert model["rms_parallax_um"] == pytest.approx(math.sqrt(np.mean(np.square(list(used.values())))), abs=0.02)
@@ -550,13 +549,12 @@ def test_photos_stand_in_flight_order_and_points_in_natural_order() -> None:
     found = case("projected", 2)
     flown = [photo for strip in found.inputs.strips for photo in strip.photos]
     assert [photo["id"] for photo in found.document["photos"]] == flown
-    residuals, parallaxes = found.document["residuals"], found.document["parallaxes"]
+    residuals = found.document["residuals"]
     assert list(dict.fromkeys(residuals["photo"])) == flown
     for names in (
         found.document["points"]["id"],
         found.document["control"]["id"],
         *(residuals.where(photo=photo)["point"] for photo in flown),
-        *(parallaxes.where(left=photo)["point"] for photo in flown),
     ):
         assert list(names) == sorted(names, key=natural)
 

@@ -51,7 +51,8 @@ def test_columns_are_there_and_of_one_length(columns: str, wrong: str) -> None:
         ("value", "[1.0, NaN]", False),
         ("value", "[-Infinity, null]", False),
         ("passed", "[true, null]", True),
-        ("passed", "[true, 1]", False),
+        ("passed", "[1, 0, null]", True),
+        ("passed", "[1, 2]", False),
         ("name", "[1.0]", False),
     ],
 )

@@ -11,10 +11,10 @@ import pytest
 
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.report.page.text import to_text
+from photostrip.report.page.layout import to_text
 from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.document import document_of
-from photostrip.result.points.standing_out import stand_out
+from photostrip.result.given import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain

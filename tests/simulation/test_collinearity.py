@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pyproj import CRS, Proj, Transformer
 
+from photostrip.geometry.rotation import about
 from photostrip.simulation import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
-from tests.attitudes import rotation_x, rotation_y, rotation_z
 
 NANOMETRE = 1e-6  # mm
 FREE = Spec(image=Image(sigma_um=0.0), control=Control(noise=(0.0, 0.0, 0.0)))
@@ -32,8 +32,8 @@ def grid_axes(crs: str, lonlat: np.ndarray) -> np.ndarray:
     """Rows grid east, grid north, normal in the geocentric frame, from PROJ's meridian convergence."""
     factors = Proj(CRS(crs)).get_factors(*lonlat.T)
     lon, lat, c = np.radians(lonlat[:, 0]), np.radians(lonlat[:, 1]), np.radians(factors.meridian_convergence)
-    true = rotation_z(lon) @ rotation_y(np.pi / 2 - lat) @ rotation_z(np.full_like(lon, np.pi / 2))  # columns E, N, U
-    return np.swapaxes(true @ rotation_z(-c), 1, 2)  # grid north lies east of north by the convergence
+    true = about(2, lon) @ about(1, np.pi / 2 - lat) @ about(2, np.full_like(lon, np.pi / 2))  # columns E, N, U
+    return np.swapaxes(true @ about(2, -c), 1, 2)  # grid north lies east of north by the convergence
 
 
 @pytest.mark.parametrize("rotation", [0.0, 90.0, 180.0, 270.0, 33.0])
@@ -98,7 +98,7 @@ def test_attitude_scatter_is_alpha_omega_kappa() -> None:
     rotations = simulate(spec).truth.rotations
     alpha = np.arctan2(-rotations[:, 0, 2], rotations[:, 2, 2])
     omega, kappa = np.arcsin(-rotations[:, 1, 2]), np.arctan2(rotations[:, 1, 0], rotations[:, 1, 1])
-    built = rotation_y(-alpha) @ rotation_x(omega) @ rotation_z(kappa)
+    built = about(1, -alpha) @ about(0, omega) @ about(2, kappa)
     assert np.abs(built - rotations).max() < 1e-12
     for angle, sigma in zip((alpha, omega, kappa), (1.0, 2.0, 3.0), strict=True):
         assert np.degrees(angle.std()) == pytest.approx(sigma, rel=4 / np.sqrt(2 * 400))

@@ -14,20 +14,20 @@ MOST_POINTS = 2400  # of all zones that are drawn one by one
 SHARE_ON_AXIS = 0.995  # share of the parallaxes that the axis holds; those beyond stand at its end
 
 
+def _hint(ray: Document, right: str, size: float) -> str:
+    return f"point {ray['point']} of {ray['photo']} – {right}: {size:+.1f} µm"
+
+
 def parallax_pictures(document: Document) -> list[Picture]:
     """Draw the y parallaxes; nothing where none are known."""
     pairs = list(document["models"])
-    number_of = {(pair["strip"], pair["left"]): n for n, pair in enumerate(pairs, 1)}
+    pair_of = {pair["left"]: (n, pair["right"]) for n, pair in enumerate(pairs, 1)}
+    left_out = document["rejected"].where(stage="relative", readmitted=False)
     rows = [
-        (
-            number_of[row["strip"], row["left"]],
-            row["zone"],
-            row["q_um"],
-            row["used"],
-            f"point {row['point']} of {row['left']} – {row['right']}: {row['q_um']:+.1f} µm",
-        )
-        for row in document["parallaxes"]
-        if row["q_um"] is not None and row["zone"] in ZONES
+        (pair_of[ray["photo"]][0], ray["zone"], size, key == "q_um", _hint(ray, pair_of[ray["photo"]][1], size))
+        for rays, key in ((document["residuals"], "q_um"), (left_out, "parallax_um"))
+        for ray in rays
+        if (size := ray[key]) is not None and ray["zone"] in ZONES and ray["photo"] in pair_of
     ]
     if not rows:
         return []

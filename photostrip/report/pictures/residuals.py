@@ -166,8 +166,8 @@ def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:
         limits, unit, sigma = [document["bundle"]["screening"]["limit"]], "", 1.0
         values, what = tests.ravel(), "image residuals, each over its own standard deviation"
     else:
-        pairs = document["parallaxes"]
-        parallaxes = pairs["q_um"][pairs["used"] & np.isfinite(pairs["q_um"])] if limits else np.zeros(0)
+        of_rays = document["residuals"]["q_um"].astype(float)
+        parallaxes = of_rays[np.isfinite(of_rays)] if limits else np.zeros(0)
         found = len(parallaxes) > 0
         values = parallaxes if found else rays.v[known & rays.used].ravel()
         limits, unit, sigma = limits if found else [], " µm", rms(values) or 1.0

@@ -12,7 +12,8 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.planning.model_plan import ModelSpec, control_layout, given_errors, plan_model
-from photostrip.project.plans import load_model_plan
+from photostrip.project.plans import ModelPlanFile
+from photostrip.project.reading import read_keys
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def test_given_errors_come_out_as_errors_of_points(answer: Answer, tmp_path: Pat
         assert part["total"] == pytest.approx(total, abs=2e-5)
         causes = np.sum([part[f"from_{cause}"] for cause in ("measuring", "elements", "control")], axis=0)
         assert causes == pytest.approx(total, abs=3e-5)
-    found = given_errors(load_model_plan(file, []).spec)
+    found = given_errors(read_keys(ModelPlanFile, file, [])[0].spec)
     assert found is not None
     assert found.parts is not None
     assert [part["total"][2] for part in parts.values()] == pytest.approx(found.parts.total[:, 2] * 10, abs=1e-5)
