@@ -18,6 +18,7 @@ from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from photostrip.errors import Fault
 
@@ -153,3 +154,8 @@ def test_the_page_of_keys_has_every_one_with_default_and_unit() -> None:
     assert "| `grubbs_alpha` | 0.05 | Probability of rejecting a good point of a pair without gross errors |" in rows
     assert "| `variance_components` | false |" in keys_page("project")
     assert "| `principal_distance` | required | Principal distance [mm] |" in rows
+
+
+def test_the_command_writes_the_page_of_any_kind_of_file(tmp_path: Path) -> None:
+    assert main(["schema", "--plan", "strip", "-o", str(tmp_path / "keys.md")]) == 0
+    assert (tmp_path / "keys.md").read_text(encoding="utf-8") == keys_page("strip")
