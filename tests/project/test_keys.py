@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from photostrip.cli.main import main
 from photostrip.formats.faults import Findings
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, keys_page, schema_of
