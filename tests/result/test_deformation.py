@@ -13,7 +13,6 @@ from scipy import stats
 from photostrip.pipeline.run import triangulate
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
-from photostrip.result.strips import model_deformations
 from photostrip.simulation import Control, Flight, Points, Spec, Terrain, simulate
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
@@ -55,20 +54,6 @@ def run(seed: int = 1, *, twist_arcsec: float = 0.0, **more: int) -> Result:
 def documents(result: Result) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = document_of(result).get("deformations", [])
     return found
-
-
-@pytest.mark.usefixtures("_no_findings")
-@pytest.mark.slow
-def test_models_without_deformation_rarely_seem_deformed() -> None:
-    t = np.array([model.surface.t_values for seed in range(30) for model in _deformations(run(seed))])
-    assert len(t) > 80
-    # student t with twenty and more redundant points: mean square hardly more than 1
-    assert 0.7 < (t**2).mean() < 1.6
-    assert np.mean(np.abs(t) > 2.0) < 0.12
-
-
-def _deformations(result: Result) -> list[Any]:
-    return [model for strip in result.strips for model in model_deformations(strip, result.frames)]
 
 
 @pytest.mark.slow
