@@ -125,20 +125,6 @@ def test_a_cause_that_is_known_needs_less_evidence() -> None:
     assert found["look_at"][0].endswith("try `earth_curvature: model`")
 
 
-def test_of_contradicting_data_a_deformation_is_told_without_metres() -> None:
-    document = moved(0, 0.0)
-    bent = {"bending": {"models": 7, "p": 0.0, "t": 9.0, "at_corner_m": 23723.735}}
-    finding = {
-        "code": "P105", "severity": "error", "message": "", "accepted": False, "points": [], "strips": []
-    }  # fmt: skip
-    alone = {**document, "common_deformation": bent}
-    assert any("23723" in text for text in verdict_of(alone)["look_at"])
-    found = verdict_of({**alone, "findings": [finding]})
-    assert found["status"] == FAILED
-    assert not any("23723" in text for text in found["look_at"])
-    assert any(text.startswith("7 models are deformed alike (bending): t = 9.0") for text in found["look_at"])
-
-
 @pytest.mark.slow
 def test_errors_are_told_without_their_size_in_images_whose_scale_is_lost() -> None:
     """A strip that its control tears apart has no photo scale: the sentence ended the run as an internal error."""
