@@ -14,12 +14,12 @@ pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 # What scripts of users rely on. A change here needs a line in CHANGELOG.md that says what to do instead.
 PARAMETERS = {
-    "check": ["project", "tables", "overrides"],
+    "check": ["project", "overrides"],
     "compare": ["result", "baseline", "tolerances"],
-    "load": ["project", "tables", "overrides"],
+    "load": ["project", "overrides"],
     "plan": ["kind", "specification", "overrides"],
     "read_result": ["path"],
-    "run": ["project", "tables", "overrides"],
+    "run": ["project", "overrides"],
     "simulate": ["specification", "overrides"],
 }
 MEMBERS = {
