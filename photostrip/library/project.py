@@ -173,7 +173,7 @@ def place_of(
     name: str,
     overrides: Mapping[str, Any],
     schema: str = "photostrip",
-) -> tuple[Path, Source | None, Mapping[str, Any]]:
+) -> tuple[Path, Source | None, dict[str, Any]]:
     """Return the path of a file, what it is read from where its content is given, and overrides that are no tables.
 
     name: what the content is called in messages.
@@ -183,7 +183,7 @@ def place_of(
     if not isinstance(given, Mapping):
         if with_tables({}, overrides)[0]:
             raise InputError(Fault("tables in memory go with a project that is a mapping", "type", str(given)))
-        return Path(given), None, overrides
+        return Path(given), None, dict(overrides)
     content, rest = with_tables({schema: 1, **given}, overrides)
     return Path(name), source_of(name, content), rest
 

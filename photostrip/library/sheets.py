@@ -64,7 +64,7 @@ def plan(
     overrides: keys with other values: ``plan("model", end_lap_percent=70, control={"layout": "six"})``.
     Raises InputError with every fault of the plan.
     """
-    path, source, rest = None, None, overrides
+    path, source, rest = None, None, dict[str, Any](overrides)
     if specification is not None:
         schema = f"photostrip_plan_{'cameras' if kind == 'camera' else kind}"
         path, source, rest = place_of(specification, "specification", overrides, schema)

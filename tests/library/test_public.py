@@ -29,7 +29,7 @@ MEMBERS = {
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
         "accuracy", "computed", "control", "covariance_of", "crs", "document", "files", "findings",
-        "name", "notes", "pairs", "photos", "pictures", "points", "rejected", "report", "residuals",
+        "name", "notes", "pairs", "photos", "plot", "points", "rejected", "report", "residuals",
         "statement", "status", "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],
