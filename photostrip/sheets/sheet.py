@@ -64,6 +64,11 @@ def hidden(*keys: str, form: str = "") -> tuple[Field, ...]:
     return tuple(Field(key, form, shown=False) for key in keys)
 
 
+def constant(**values: Any) -> tuple[Field, ...]:  # noqa: ANN401 (whatever stands in a cell)
+    """Return columns that stand in JSON and CSV alone, with the same value in every row of ``listed``."""
+    return tuple(Field(key, shown=False, of=lambda _, value=value: value) for key, value in values.items())
+
+
 @dataclass(frozen=True)
 class Rows:
     """A table; without a title it goes on with the section before. Tables of one key are one table in JSON and CSV."""
