@@ -16,7 +16,7 @@ Source: [000] eq. 1, 5-8; [003] eq. 10.8, 10.12.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import erfc, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +34,7 @@ from photostrip.planning.single_model import (
     orientation_parameters,
     parallaxes,
 )
-from photostrip.statistics import normal_quantile, t_p_value, t_quantile
+from photostrip.statistics import normal_quantile, t_quantile
 from photostrip.strip import relative_orientation
 
 DEFORMATION_TERMS = ("E0", "A", "B", "C", "D")
@@ -165,13 +165,6 @@ class Paraboloid:
         """C and D over their standard deviations, shape (2,)."""
         with np.errstate(divide="ignore", invalid="ignore"):  # parallaxes without any error
             return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
-
-    @property
-    def p_values(self) -> tuple[float, ...]:
-        """Probabilities of larger |t| by chance."""
-        if self.redundancy < LEAST_REDUNDANCY:
-            return tuple(erfc(abs(t) / sqrt(2)) for t in self.t_values.tolist())
-        return tuple(t_p_value(t, self.redundancy) for t in self.t_values.tolist())
 
     def critical(self, alpha: float = 0.05) -> float:
         """Return what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""

@@ -65,7 +65,6 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         ),
         "models": strips.independent_models_of(result) if result.model_strips else strips.models_of(result),
         **({"links": strips.links_of(result)} if result.model_strips else {}),
-        **strips.deformations_of(result),
         "junctions": strips.junctions_of(result),
         **points.photos_of(result, images),
         "points": table,

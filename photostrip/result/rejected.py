@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import repeat
+from operator import itemgetter
 
 import numpy as np
 
@@ -86,51 +86,37 @@ def _entry(**values: object) -> Document:
     return EMPTY | values
 
 
-def _entries(**columns: object) -> list[Document]:
-    """Make entries of columns; a text, a flag or None stands in each."""
-    size = next(len(column) for column in columns.values() if isinstance(column, list | np.ndarray))
-    listed = [column if isinstance(column, list | np.ndarray) else repeat(column, size) for column in columns.values()]
-    return [EMPTY | dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]
-
-
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     ids, photos, oriented = observations.point_ids, strip.strip.photos, strip.of_photos.orientation
     wrong_rays = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
-    pair, point, rays, rank = oriented.pairs.pair, oriented.point, oriented.rows, natural_rank(ids)
-    every = sorted(strip.of_photos.rejections, key=lambda each: (int(pair[each.row]), int(rank[point[each.row]])))
-    found: list[Document] = [{}] * len(every)
-    for unit, factor in (("um", MICROMETRES), ("", 1.0)):
-        places = [n for n, each in enumerate(every) if (each.test == "parallax") == (unit == "um")]
-        some = [every[place] for place in places]
-        rows = [each.row for each in some]
-        size = [each.worst * MICROMETRES for each in some]
-        blamed = [
-            []
-            if each.readmitted
-            else [observations.photo_ids[observations.photo[row]] for row in rays[each.row] if row in wrong_rays]
-            for each in some
-        ]
-        entries = _entries(
-            strip=[strip.strip.id] * len(some),
-            photo=[photos[pair[row]] for row in rows],
-            other_photo=[photos[pair[row] + 1] for row in rows],
-            point=[ids[point[row]] for row in rows],
+    pair, point, zone, rank = oriented.pairs.pair, oriented.point, strip.of_photos.screened.zone, natural_rank(ids)
+    found = []
+    for each in sorted(strip.of_photos.rejections, key=lambda each: (int(pair[each.row]), int(rank[point[each.row]]))):
+        left, rays = int(pair[each.row]), oriented.rows[each.row].tolist()
+        wrong = [] if each.readmitted else [row for row in rays if row in wrong_rays]
+        blamed = [observations.photo_ids[observations.photo[row]] for row in wrong]
+        in_um, size = each.test == "parallax", each.worst * MICROMETRES
+        entry = _entry(
+            strip=strip.strip.id,
+            photo=photos[left],
+            other_photo=photos[left + 1],
+            point=ids[point[each.row]],
             stage="relative",
-            test=[each.test for each in some],
-            value=np.array([each.value for each in some]) * factor,
-            limit=np.array([each.limit for each in some]) * factor,
-            unit=[unit] * len(some),
-            parallax_um=np.array(size),
-            zone=strip.of_photos.screened.zone[rows],
-            size=np.array(size),
-            size_unit=["um"] * len(some),
-            readmitted=[each.readmitted for each in some],
+            **_tested(each, MICROMETRES if in_um else 1.0),
+            unit="um" if in_um else "",
+            parallax_um=size,
+            zone=zone[each.row],
+            size=size,
+            readmitted=each.readmitted,
             blamed=blamed,
-            reason=list(map(_reason_of_pair, some, size, blamed)),
+            reason=_reason_of_pair(each, size, blamed),
         )
-        for place, entry in zip(places, entries, strict=True):
-            found[place] = entry
+        found.append(entry)
     return found
+
+
+def _tested(rejection: Rejection, factor: float = 1.0) -> Document:
+    return {"test": rejection.test, "value": rejection.value * factor, "limit": rejection.limit * factor}
 
 
 def _reason_of_pair(rejection: Rejection, size: float, blamed: list[str]) -> str:
@@ -186,35 +172,29 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     in_pair = np.zeros(len(observations), np.intp)  # with the next photo, else with the one before
     for side in (1, 0):
         in_pair[strip.of_photos.orientation.rows[:, side]] = strip.of_photos.screened.zone
-    zone = in_pair.tolist()
     photo_of = {photo: number for number, photo in enumerate(strip.strip.photos)}
-    every = rejected_by_strip(strip)
-    photos = [observations.photo_ids[observations.photo[each.row]] for each in every]
-    points = [observations.point_ids[observations.point[each.row]] for each in every]
-    rays = [place for place, each in enumerate(every) if each.kind != "control"]
-    size = np.array([every[place].worst for place in rays]) * MICROMETRES
-    entries = _entries(
-        strip=[strip.strip.id] * len(rays),
-        photo=[photos[place] for place in rays],
-        point=[points[place] for place in rays],
-        stage="rays",
-        test="strip",
-        value=np.array([every[place].value for place in rays]),
-        limit=np.array([every[place].limit for place in rays]),
-        unit=[""] * len(rays),
-        zone=[zone[every[place].row] or None for place in rays],
-        size=size,
-        size_unit=["um"] * len(rays),
-        blamed=[[photos[place]] if every[place].cause == WRONG_RAY else [] for place in rays],
-        reason=[REASONS[every[place].cause] for place in rays],
-    )
-    entries = [entry if np.isfinite(entry["size"]) else entry | {"size_unit": ""} for entry in entries]
-    found = dict(zip(rays, entries, strict=True))
-    for place in sorted(set(range(len(every))) - found.keys()):
-        found[place] = _from_control(strip, every[place], points[place], photos[place])
-    rank = natural_rank(observations.point_ids)[observations.point[[each.row for each in every]]].tolist()
-    order = sorted(range(len(every)), key=lambda place: (rank[place], photo_of[photos[place]]))
-    return [found[place] for place in order]
+    rank, found = natural_rank(observations.point_ids), []
+    for each in rejected_by_strip(strip):
+        photo = observations.photo_ids[observations.photo[each.row]]
+        number = observations.point[each.row]
+        point, size = observations.point_ids[number], each.worst * MICROMETRES
+        if each.kind == "control":
+            entry = _from_control(strip, each, point, photo)
+        else:
+            entry = _entry(
+                strip=strip.strip.id,
+                photo=photo,
+                point=point,
+                stage="rays",
+                **(_tested(each) | {"test": "strip"}),
+                zone=in_pair[each.row] or None,
+                size=size,
+                size_unit="um" if np.isfinite(size) else "",
+                blamed=[photo] if each.cause == WRONG_RAY else [],
+                reason=REASONS[each.cause],
+            )
+        found.append(((int(rank[number]), photo_of[photo]), entry))
+    return [entry for _, entry in sorted(found, key=itemgetter(0))]
 
 
 def rejected_by_strip(strip: StripResult) -> list[Rejection]:
@@ -318,32 +298,25 @@ def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Docume
         for strip in reversed(found.start.strips)
         for unit in (strip.of_models.strip.models if of_models else strip.strip.photos)
     }
-    entries: list[Document] = [{}] * len(every)
-    for name, kind in written.items():
-        places = [place for place, each in enumerate(every) if each.kind == name]
-        some = [every[place] for place in places]
-        names = [names_of_observation(problem, name, each.row) for each in some]
-        size = [rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit]) for each in some]
-        made = _entries(
-            strip=[strip_of.get(unit or "", "") for unit, _ in names],
-            photo=[None if of_models else unit for unit, _ in names],
-            **({"models": [[] if unit is None else [unit] for unit, _ in names]} if of_models else {}),
-            point=[point for _, point in names],
+    entries = []
+    for each in every:
+        kind = written[each.kind]
+        unit, point = names_of_observation(problem, each.kind, each.row)
+        size = rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit])
+        entry = _entry(
+            strip=strip_of.get(unit or "", ""),
+            photo=None if of_models else unit,
+            **({"models": [] if unit is None else [unit]} if of_models else {}),
+            point=point,
             stage="bundle",
-            test=[each.test for each in some],
-            value=np.array([each.value for each in some]),
-            limit=np.array([each.limit for each in some]),
+            **_tested(each),
             size=size,
-            size_unit=[kind.unit] * len(some),
-            readmitted=[each.readmitted for each in some],
-            blamed=[
-                [unit] if each.cause == WRONG_RAY and not each.readmitted and not of_models else []
-                for each, (unit, _) in zip(some, names, strict=True)
-            ],
-            reason=[_reason_of_bundle(each, kind, shift, problem) for each, shift in zip(some, size, strict=True)],
+            size_unit=kind.unit,
+            readmitted=each.readmitted,
+            blamed=[unit] if each.cause == WRONG_RAY and not each.readmitted and not of_models else [],
+            reason=_reason_of_bundle(each, kind, size, problem),
         )
-        for place, entry in zip(places, made, strict=True):
-            entries[place] = entry
+        entries.append(entry)
     begun = [each for each in entries if each["test"] == START]
     begun.sort(key=lambda each: (natural(each["point"] or ""), natural(each["photo"] or "")))
     return begun + [each for each in entries if each["test"] != START]

@@ -2,10 +2,9 @@
 
 It is made from the finished document, so that a saved result has the same verdict; its limits stand first.
 
-Five questions share one level equally (``TEST_LEVEL``), and the tests of a question share its part: a probability
-here is that of the test times the number of tests of its question (Bonferroni), so that each is held against the same
-level. The fifth question, whether a given point stands out beside the others, is put where the differences are made
-(``given.stand_out``).
+Each question has the same level (``TEST_LEVEL``), which its tests share: a probability here is that of the test times
+the number of tests of its question (Bonferroni), so that each is held against the same level. Whether a given point
+stands out beside the others is asked where the differences are made (``given.stand_out``).
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ LEAST_STATED = 0.005  # micrometres, which the document rounds to nothing
 
 SIGMA0, RESIDUALS, PAIRS = "sigma0", "image residuals", "pairs"
 CHECKS, LEFT_OUT = "check points", "control left out in turn"
-ALIKE, MODELS = "models deformed alike", "deformed models"
 
 
 class Pair(NamedTuple):
@@ -43,15 +41,11 @@ def probabilities(document: Document) -> dict[str, float]:
     """Return the probability by chance of what each test found, those that could be made."""
     seen = {CHECKS: _chance_of_checks(document), LEFT_OUT: document.get("cross_validation", {}).get("p")}
     made = {name: p for name, p in seen.items() if p is not None}
-    common = [each["p"] for each in document.get("common_deformation", {}).values() if each["p"] is not None]
-    single = [row["p"] for row in document.get("deformations", []) if row["p"] is not None]  # of all models
     found = {
         SIGMA0: [2 * _larger(sigma0_ratio(document), document["summary"]["redundancy"])],
         RESIDUALS: [2 * _larger(residuals_ratio(document), 2 * document["counts"]["image_points_used"])],
         PAIRS: [p for pair in pairs(document) for p in (pair.among, pair.beside_stated)],
         **{name: [p * len(made)] for name, p in made.items()},
-        ALIKE: [p * len(common) * 2 for p in common],
-        MODELS: [p * 2 for p in single],
     }
     return {name: min(1.0, *values) for name, values in found.items() if values}
 
@@ -116,7 +110,7 @@ def _chance_of_checks(document: Document) -> float | None:
 
 
 Tests = Mapping[str, float]  # probabilities by chance
-PARTS, TERMS = ("plan", "height"), ("twist", "bending")
+PARTS = ("plan", "height")
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 
 PAIR_RATIO = 1.5  # of a pair's sigma0, or of image residuals, to that of the others, or to what is stated
@@ -143,8 +137,6 @@ def verdict_of(document: Document) -> Document:
         *(
             () if errors else (each for each in _numbers(document, tests) if each not in failed)
         ),  # of data that contradict themselves as a whole they say the same
-        *_common_deformation(document, in_metres=not errors),
-        *(() if errors else _deformed(document)),
         *_rejected(document),
         *_kinds(document, others, "note"),
     ]
@@ -417,31 +409,6 @@ def _pairs(document: Document, tests: Tests) -> Iterator[str]:
             f"largest y parallax is at point {row['max_parallax_point']}"
         )
     yield from _more(len(odd), "pair")
-
-
-def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]:
-    """Name what all models have in common; in data that contradict themselves metres mean nothing."""
-    for name, common in document.get("common_deformation", {}).items():
-        if common["p"] is not None and 2 * len(TERMS) * common["p"] < TEST_LEVEL:
-            size = f" {common['at_corner_m']:+.3f} m at a corner against the middle in the mean," if in_metres else ""
-            yield (
-                f"{common['models']} models are deformed alike ({name}):{size} t = {common['t']:.1f}; a lens, the film "
-                "or the principal distance"
-            )
-
-
-def _deformed(document: Document) -> Iterator[str]:
-    """Name models that are bent or twisted beyond chance."""
-    odd = [row for row in document.get("deformations", []) if 2 * row["p"] < TEST_LEVEL]
-    odd.sort(key=lambda row: -max(abs(row[f"{name}_at_corner_m"]) for name in TERMS))
-    for row in odd[:NAMED]:
-        name = max(TERMS, key=lambda name: abs(row[f"{name}_t"]))
-        size, t = row[f"{name}_at_corner_m"], row[f"{name}_t"]
-        yield (
-            f"the model of photos {row['left']} and {row['right']} is deformed ({name}): {size:.3f} m at a corner "
-            f"against the middle, t = {t:.1f}"
-        )
-    yield from _more(len(odd), "model")
 
 
 def _more(number: int, one: str, kind: str = "") -> Iterator[str]:

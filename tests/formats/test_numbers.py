@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from photostrip.formats.faults import LARGEST_NUMBER, NotANumber, number, shown
 from photostrip.formats.tables import floats
-from tests.loops import nonempty
 
 
 @given(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER))
@@ -93,15 +90,6 @@ def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: li
         return
     assert all(map(is_number, column))
     assert fast.tolist() == [number(cell) for cell in column]
-
-
-@given(st.lists(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER), min_size=1))
-def test_a_column_of_numbers_is_converted_at_once(values: list[float]) -> None:
-    fast = floats(list(map(repr, values)))
-    assert fast is not None
-    assert all(
-        math.copysign(1, a) == math.copysign(1, b) and a == b for a, b in nonempty(zip(fast, values, strict=True))
-    )
 
 
 @pytest.mark.parametrize(

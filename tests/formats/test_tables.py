@@ -56,31 +56,6 @@ def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chu
     assert [lines[line - 1].split(",")[1] for line in read.table.lines] == [row[1] for row in rows]
 
 
-def test_ten_thousand_rows_of_several_chunks(tmp_path: Path) -> None:
-    n = 2 * tables.CHUNK + 5
-    text = HEADER + "".join(f"{i // 100},P{i % 100},{i}.5,-{i}\n" for i in range(n))
-    findings = Findings()
-    read = read_measurements([str(write(tmp_path / "o.csv", text))], findings)
-    assert read is not None
-    assert findings.faults == ()
-    np.testing.assert_array_equal(read.xy, np.column_stack([np.arange(n) + 0.5, -np.arange(n)]))
-    np.testing.assert_array_equal(read.table.lines, np.arange(n) + 2)
-
-
-@pytest.mark.slow
-def test_memory_is_a_few_times_the_file(tmp_path: Path) -> None:
-    text = HEADER + "".join(f"{i // 100},P{i:08d},{i / 1000:.4f},{-i / 1000:.4f}\n" for i in range(60_000))
-    path = write(tmp_path / "o.csv", text)
-    tracemalloc.start()
-    read = read_measurements([str(path)], Findings())
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert read is not None
-    assert len(read.table) == 60_000
-    # the cells alone, all of them at once as Python texts, are 240 000 x 60 bytes, ten times the file
-    assert peak < 13 * len(text)
-
-
 def test_columns_that_are_not_there_are_nan(tmp_path: Path) -> None:
     table = read_table(str(write(tmp_path / "o.csv", HEADER + "1,P,2,3\n")), OBSERVATIONS, Findings())
     assert table is not None

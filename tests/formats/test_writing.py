@@ -27,13 +27,8 @@ def test_files_are_written_and_missing_folders_made(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
     write_files(folder, {"one.csv": "1\n", "two.json": "µ\r\n"})
     assert (folder / "two.json").read_bytes() == "µ\r\n".encode()
+    write_files(folder, {"one.csv": "2\n"})
     assert sorted(content(folder)) == ["one.csv", "two.json"]
-
-
-def test_other_files_of_the_folder_stay(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
-    write_files(tmp_path, {"one.csv": "1"})
-    assert content(tmp_path) == {"notes.txt": "mine", "one.csv": "1"}
 
 
 def test_a_failure_in_the_middle_leaves_everything_as_it_was(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from photostrip.cli.main import main
 from photostrip.formats.faults import Findings
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, keys_page, schema_of
@@ -18,6 +19,7 @@ from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from photostrip.errors import Fault
 
@@ -153,3 +155,8 @@ def test_the_page_of_keys_has_every_one_with_default_and_unit() -> None:
     assert "| `grubbs_alpha` | 0.05 | Probability of rejecting a good point of a pair without gross errors |" in rows
     assert "| `variance_components` | false |" in keys_page("project")
     assert "| `principal_distance` | required | Principal distance [mm] |" in rows
+
+
+def test_the_command_writes_the_page_of_any_kind_of_file(tmp_path: Path) -> None:
+    assert main(["schema", "--plan", "strip", "-o", str(tmp_path / "keys.md")]) == 0
+    assert (tmp_path / "keys.md").read_text(encoding="utf-8") == keys_page("strip")

@@ -15,8 +15,6 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Precision
-from photostrip.report.page.layout import to_text
-from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.derived import ellipses
 from photostrip.result.document import document_of
 from photostrip.result.given import normalised
@@ -121,19 +119,6 @@ def test_photo_covariances_are_those_of_turned_photos(frame: str) -> None:
     assert expected == pytest.approx((scatter / np.outer(spread, spread))[np.triu_indices(6, 1)], abs=0.012)
 
 
-def test_tables_carry_the_precision() -> None:
-    known = precise("projected")
-    files = result_files(known.document)
-    points = list(csv.DictReader(StringIO(files["points.csv"])))
-    for line, row in nonempty(zip(points, known.document["points"], strict=True)):
-        for key in ("sigma_x", "sigma_z", "cov_xy", "cov_yz", "ellipse_a", "ellipse_azimuth_deg"):
-            assert float(line[key]) == pytest.approx(row[key], abs=1e-9)
-    photos = list(csv.DictReader(StringIO(files["photos.csv"])))
-    for line, row in nonempty(zip(photos, known.document["photos"], strict=True)):
-        assert float(line["sigma_y"]) == pytest.approx(row["sigma_y"])
-        assert float(line["sigma_kappa_deg"]) == pytest.approx(row["sigma_angle_3"], abs=1e-6)
-
-
 def test_the_block_sums_up_and_follows_the_strip() -> None:
     known = precise("projected")
     block, points = known.document["precision"], known.document["points"]
@@ -144,16 +129,6 @@ def test_the_block_sums_up_and_follows_the_strip() -> None:
     assert sum(row["points"] for row in block["along"]) == len(points)
     assert [row["photo"] for row in block["along"]] == [photo["id"] for photo in known.document["photos"]]
     assert block["basis"] == [{"strip": known.result.strips[0].strip.id, "sigma_um": 5.0, "basis": "a-priori"}]
-
-
-def test_the_report_names_the_least_precise_points() -> None:
-    known = precise("projected")
-    text = to_text(title_of(known.document), sections_of(known.document), 100)
-    worst = known.document["precision"]["points"]["height"]["worst"]
-    assert "5.0 µm, as stated" in text
-    assert f"m at {worst}" in text
-    assert "the least precise in plan" in text
-    assert "at photo" in text
 
 
 def test_check_points_are_measured_along_the_axes_in_which_they_are_given() -> None:
@@ -196,5 +171,3 @@ def test_check_points_go_with_their_standard_deviations(frame: str, adjustment: 
     for name, rows in (("plan", 2), ("height", 1)):
         values = np.array([row[name] for row in check["points"]])
         assert check[name]["rms"] == pytest.approx(np.sqrt(np.mean(values**2) / rows), abs=0.01)
-    text = " ".join(to_text(title_of(document), sections_of(document), 100).split())
-    assert "inside the 95 % ellipse in plan" in text
