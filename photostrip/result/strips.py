@@ -12,9 +12,10 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
+from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import compare_with_given
 from photostrip.pipeline.precision import mean_points
-from photostrip.pipeline.results import Adjusted, PhotoStages, Result, StripResult
+from photostrip.pipeline.results import Adjusted, Result, StripResult
 from photostrip.points import locate
 from photostrip.result.given import differences, of_used
 from photostrip.result.numbers import MATRIX, record, rms
@@ -107,7 +108,7 @@ def _detectable(strip: StripResult) -> Floats:
     return np.where(np.isfinite(worst), worst, np.nan)
 
 
-def _parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:
+def _parallax_limits(of_photos: FormedPhotos, settings: RelativeSettings) -> Floats:
     """Median parallax of each pair, mm, from which on the search takes a point out; NaN where nothing is tested.
 
     A limit that depends on the redundancy of a point is smaller where there is little of it.
@@ -325,13 +326,13 @@ def strip_of(result: Result, strip: StripResult) -> Document:
 
 
 def _fit_of_photos(result: Result, strip: StripResult) -> Document:
-    sums, stages = Parallaxes.of(strip), strip.of_photos
+    sums, oriented = Parallaxes.of(strip), strip.of_photos.orientation
     return {
-        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[stages.rows]),
+        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[strip.rows]),
         "sigma0_um": 1000.0 * sigma0_of_pairs(sums.squares, sums.redundancy),
         "redundancy": int(sums.redundancy.sum()),
-        "rms_parallax_um": 1000.0 * rms(stages.orientation.parallax[stages.orientation.used]),
-        "image_rms_um": 1000.0 * rms(stages.resection.residuals),
+        "rms_parallax_um": 1000.0 * rms(oriented.parallax[oriented.used]),
+        "image_rms_um": 1000.0 * rms(strip.resection.residuals),
     }
 
 
