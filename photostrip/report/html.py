@@ -16,7 +16,7 @@ from photostrip.notes import Document
 from photostrip.report.commands.batch import batch_page_sections
 from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import BETWEEN
-from photostrip.report.pictures.batch import batch_maps
+from photostrip.report.pictures.commands import batch_maps
 from photostrip.report.pictures.result import SECTIONS, pictures_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.accuracy_report import named_sections, title_of

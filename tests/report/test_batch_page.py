@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any
 
 from photostrip.report.html import batch_html
-from photostrip.report.pictures.batch import batch_maps
+from photostrip.report.pictures.commands import batch_maps
 from tests.loops import nonempty
 
 EARTH, MOON = 6378137.0, 1737400.0
