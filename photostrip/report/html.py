@@ -14,7 +14,7 @@ from importlib import resources
 from itertools import groupby
 
 from photostrip.notes import Document
-from photostrip.report.commands.batch import batch_page_sections
+from photostrip.report.commands.batch import batch_sections
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import BETWEEN
 from photostrip.report.pictures.commands import batch_maps
@@ -38,7 +38,7 @@ def to_html(document: Document) -> str:
 
 def batch_html(outcomes: Sequence[Document], version: str) -> str:
     """Return the summary of a batch as a page that leads to the reports."""
-    verdict, *others = batch_page_sections(outcomes)
+    *others, verdict = batch_sections(outcomes, everything=True)
     named = [("verdict", verdict), *(("", section) for section in others)]
     return _page("Batch", version, _sections(named, batch_maps(outcomes)))
 

@@ -287,7 +287,7 @@ def test_every_project_leads_to_its_report_and_a_faulty_one_to_none() -> None:
 
 def test_the_worst_comes_first() -> None:
     page = batch_html(OUTCOMES, "1")
-    texts = ("1 faulty, 1 look, 3 good", "The worst things</h2>", "is wrong", "photo 7 is odd")
+    texts = ("1 faulty, 1 look, 3 good", "What is wrong</h2>", ":3: is wrong", "photo 7 is odd")
     order = [page.index(text) for text in texts]
     assert order == sorted(order)
 
