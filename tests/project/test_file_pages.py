@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,7 +11,6 @@ from photostrip.formats.measured import Manner, read_control, read_measurements
 from photostrip.project.keys import ProjectFile
 from photostrip.project.reading import checked, parse
 from tests.pages import blocks
-from tests.project.samples import MARKED_FILES, sample
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -49,21 +47,3 @@ def test_the_example_of_a_table_is_right(tmp_path: Path, page: str, rows: int) -
         assert read is not None
         assert len(read.table) == rows
     assert (findings.faults, findings.notes) == ((), [])
-
-
-SHOWN = [
-    ("fiducials.md", "fiducials.csv", "1001,F1", "1001,F7"),
-    ("fiducials.md", "fiducials.csv", "2002,F1,106.1,-106\n2002,F2,-105.9,-106\n", ""),
-]
-
-
-@pytest.mark.parametrize(("page", "file", "old", "new"), SHOWN)
-def test_the_faults_that_a_page_shows_are_those_of_the_program(
-    tmp_path: Path, page: str, file: str, old: str, new: str
-) -> None:
-    project = sample(tmp_path, MARKED_FILES)
-    project.change(file, old, new)
-    (told,) = project.lines()
-    words = re.sub(r"^\S+:\d+(:\d+)?: ", "", told).replace("one of F1, F2", "one of F1, F2, F3, F4")
-    shown = (PAGES / page).read_text(encoding="utf-8")
-    assert words in shown
