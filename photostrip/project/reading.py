@@ -27,7 +27,7 @@ from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.table_reader import WORDS
 from photostrip.formats.text.table_text import Form
 from photostrip.notes import Note, counted
-from photostrip.project.sections import Section, WrongValueError, bare, is_section, kinds_of, wrong
+from photostrip.project.sections import Section, WrongValueError, WrongValuesError, bare, is_section, kinds_of, wrong
 
 COMMAND_LINE = "--set"  # the place of values that the command line sets
 OVERRIDE = "override"  # the place of those that a script sets
@@ -631,7 +631,8 @@ def checked(kind: type[S], root: Node, findings: Findings) -> S | None:
         return kind.model_validate(root.plain)
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        findings.add(*_once(dict.fromkeys(_fault(kind, root, each) for each in problems[:MOST_EXPLAINED])))
+        told = (fault for each in problems[:MOST_EXPLAINED] for fault in _faults(kind, root, each))
+        findings.add(*_once(dict.fromkeys(told)))
         findings.count(root.place.file, len(problems[MOST_EXPLAINED:]))
         return None
 
@@ -659,23 +660,27 @@ def valid_section(kind: type[S], value: object) -> S | None:
         return None
 
 
-def _fault(kind: type[Section], root: Node, problem: Any) -> Fault:  # noqa: ANN401 (a mapping of pydantic)
+def _faults(kind: type[Section], root: Node, problem: Any) -> Iterator[Fault]:  # noqa: ANN401 (a mapping of pydantic)
     """Say what is wrong in the words of the user, with its place in the file."""
     path, owner = _followed(kind, root, problem["loc"])
     if get_origin(owner) is tuple and problem["type"] == "missing":  # one of its values; it has too few
         path = path[:-1]
-    error = _explained(problem, str(path[-1]) if path else "", owner)
-    at, fix = (*path, *error.at.split(".")) if error.at else path, error.fix
-    place = root.place_of(at)
-    if error.code == "unknown-key":
-        name, node = str(path[-1]), root.find(*path[:-1])
-        place = node.keys.get(name, place) if node is not None else place
-        if not fix and name in homes(kind):
-            fix = f"`{name}` belongs in `{homes(kind)[name]}`"
-    expected = "" if error.code == "unknown-key" and fix else error.expected
-    if error.code == "schema-number":
-        expected = f"{key_path(at)}: {expected}"
-    return place.fault(error.message, error.code, key=key_path(at), expected=expected, fix=fix)
+    if isinstance(together := problem.get("ctx", {}).get("error"), WrongValuesError):
+        errors = together.told
+    else:
+        errors = (_explained(problem, str(path[-1]) if path else "", owner),)
+    for error in errors:
+        at, fix, expected = (*path, *error.at.split(".")) if error.at else path, error.fix, error.expected
+        place = root.place_of(at)
+        if error.code == "unknown-key":
+            name, node = str(path[-1]), root.find(*path[:-1])
+            place = node.keys.get(name, place) if node is not None else place
+            if not fix and name in homes(kind):
+                fix = f"`{name}` belongs in `{homes(kind)[name]}`"
+            expected = "" if fix else expected
+        elif error.code == "schema-number":
+            expected = f"{key_path(at)}: {expected}"
+        yield place.fault(error.message, error.code, key=key_path(at), expected=expected, fix=fix)
 
 
 def _followed(kind: type[Section], root: Node, steps: KeyPath) -> tuple[KeyPath, Any]:

@@ -33,6 +33,7 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    Refusals,
     SchemaNumber,
     Section,
     Whole,
@@ -41,7 +42,6 @@ from photostrip.project.sections import (
     choice,
     key,
     length,
-    rule,
     wrong,
 )
 from photostrip.terrestrial.accuracy import Theodolite
@@ -141,11 +141,10 @@ class Camera(Section):
     )
     format: tuple[Width, Width] | None = key("Width and height of the field of measurement", None, unit="mm")
 
-    @rule
-    def _has_a_principal_distance(self) -> None:
+    def rules(self) -> Refusals:
         if self.preset is None and self.principal_distance is None:
             expected = "`preset`, or `principal_distance` in mm"
-            raise wrong("nothing says what the camera is", code="missing-key", expected=expected)
+            yield wrong("nothing says what the camera is", code="missing-key", expected=expected)
 
 
 def _named(value: object) -> object:
@@ -231,12 +230,15 @@ class Turned(Section):
         """Whether the optical axis and the photo's x axis are horizontal."""
         return self.omega == 0 and self.kappa == 0
 
-    def attitude_in(self, angles: str, at: str = "") -> Attitude:
-        """Return the attitude; `angles`: their unit. Raises a fault, of a key under `at`, where it has no azimuth."""
-        unit = RADIANS[angles]
-        if abs(np.cos(self.omega * unit)) < GIMBAL:
+    def vertical(self, angles: str, at: str = "") -> Refusals:
+        """Refuse an attitude that has no azimuth; `angles`: their unit, `at`: above its keys."""
+        if abs(np.cos(self.omega * RADIANS[angles])) < GIMBAL:
             message = f"with {self.omega:g} {angles} the camera looks straight up or down, and has no azimuth"
-            raise wrong(message, code="range", at=f"{at}omega", expected="an elevation below 90 degrees")
+            yield wrong(message, code="range", at=f"{at}omega", expected="an elevation below 90 degrees")
+
+    def attitude_in(self, angles: str) -> Attitude:
+        """Return the attitude; `angles`: their unit."""
+        unit = RADIANS[angles]
         turned = (self.alpha * unit, self.omega * unit, self.kappa * unit)
         return Attitude(turned, ground_from_photo(*turned), angles)
 
@@ -244,9 +246,8 @@ class Turned(Section):
 class Looking(WithCamera, Turned):
     """A camera and where it looks."""
 
-    @rule
-    def _has_an_azimuth(self) -> None:
-        self.attitude_in(self.angles)
+    def rules(self) -> Refusals:
+        return self.vertical(self.angles)
 
     @property
     def attitude(self) -> Attitude:
@@ -259,11 +260,10 @@ class Pointed(Looking):
     table: Words | None = key("Table `point,x,z` or `point,lambda,beta`, .csv or .csv.gz", None)
     at: list[Pair] = key("Points instead of a table: [[x, z]] or [[lambda, beta]]", [])
 
-    @rule
-    def _one_source(self) -> None:
+    def rules(self) -> Refusals:
         if (self.table is None) == (not self.at):
             message = "points are given twice, in `table` and with `at`" if self.at else "no points are given"
-            raise wrong(message, code="no-points", expected="`table` or `at`")
+            yield wrong(message, code="no-points", expected="`table` or `at`")
 
 
 class DirectionsFile(Pointed):
@@ -299,16 +299,12 @@ class AccuracyFile(OverPhoto):
         """Attitudes at both ends of the base; one where they are the same."""
         return [self.attitude] if self.right is None else [self.attitude, self.right.attitude_in(self.angles)]
 
-    @rule
-    def _right_end_has_an_azimuth(self) -> None:
+    def rules(self) -> Refusals:
         if self.right is not None:
-            self.right.attitude_in(self.angles, "right.")
-
-    @rule
-    def _printed_for_a_level_camera(self) -> None:
+            yield from self.right.vertical(self.angles, "right.")
         if self.as_printed and not self.both_level:
             message = "the printed formulas hold for a level camera"
-            raise wrong(message, code="as-printed", at="as_printed", fix="leave out `omega` and `kappa`")
+            yield wrong(message, code="as-printed", at="as_printed", fix="leave out `omega` and `kappa`")
 
 
 class Measuring(Section):
@@ -323,11 +319,10 @@ class Measuring(Section):
     vertical_arcsec: Seconds | None = key("The same of a vertical one; default: as horizontal", None, unit="arcsec")
     rounds: Annotated[Whole, Range(1, 10_000, "rounds")] = key("Rounds measured", 1)
 
-    @rule
-    def _one_precision(self) -> None:
+    def rules(self) -> Refusals:
         if self.theodolite is not None and self.sigma_arcsec is not None:
             message = "the theodolite and its standard deviation are both given"
-            raise wrong(message, code="two-keys", at="sigma_arcsec", fix="leave out one of them")
+            yield wrong(message, code="two-keys", at="sigma_arcsec", fix="leave out one of them")
 
     @property
     def measured(self) -> Theodolite:
@@ -341,11 +336,10 @@ class TheodoliteFile(OverPhoto, Measuring):
 
     sigma_um: Micrometres | None = key("Image accuracy wanted: how many rounds it needs", None, unit="um")
 
-    @rule
-    def _has_a_precision(self) -> None:
+    def rules(self) -> Refusals:
         if self.theodolite is None and self.sigma_arcsec is None:
             message = "nothing says how well directions are measured"
-            raise wrong(message, code="no-theodolite", expected="`sigma_arcsec` or `theodolite`")
+            yield wrong(message, code="no-theodolite", expected="`sigma_arcsec` or `theodolite`")
 
 
 class OrientationFile(WithCamera, Measuring):
@@ -550,19 +544,18 @@ class Station(Section):
         "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
     )
 
-    @rule
-    def _is_complete(self) -> None:
+    def rules(self) -> Refusals:
         turned = [name for name in ("alpha", "omega", "kappa") if getattr(self, name) is not None]
         if self.directions is not None and turned:
             message = f"`directions` gives the orientation of the photo, and `{turned[0]}` another one"
-            raise wrong(message, code="two-keys", at=turned[0], fix="remove one of the two")
+            yield wrong(message, code="two-keys", at=turned[0], fix="remove one of the two")
         if (self.position is None) != (self.alpha is None and self.directions is None):
             given = "alpha" if self.directions is None else "directions"
             missing, other = ("position", given) if self.position is None else ("alpha", "position")
             message = f"`{other}` is given and `{missing}` is not"
-            raise wrong(message, code="missing-key", expected="both, or neither in the normal case")
+            yield wrong(message, code="missing-key", expected="both, or neither in the normal case")
         if self.position is None and turned:
-            raise wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
+            yield wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
 
     @property
     def free(self) -> bool:
@@ -598,18 +591,17 @@ class Measurements(Section):
         "Standard deviation of a pseudo-parallax in rows without one; default: `sigma`", None, unit="unit"
     )
 
-    @rule
-    def _one_table(self) -> None:
+    def rules(self) -> Refusals:
         if (self.coordinates is None) == (self.pseudo_parallaxes is None):
             what = "two tables are named" if self.coordinates is not None else "no table is named"
-            raise wrong(what, code="missing-key", expected="either `coordinates` or `pseudo_parallaxes`")
+            yield wrong(what, code="missing-key", expected="either `coordinates` or `pseudo_parallaxes`")
         if self.coordinates is not None and self.sigma_d is not None:
             message = "coordinates have no pseudo-parallaxes that could have a standard deviation"
-            raise wrong(message, at="sigma_d", fix="remove it; use `sigma`")
+            yield wrong(message, at="sigma_d", fix="remove it; use `sigma`")
         for name, value in (("sigma", self.sigma), ("sigma_d", self.sigma_d)):
             if value is not None and not IMAGE_SIGMA.holds(value * MILLIMETRES[self.unit]):
                 message = f"{value:g} {self.unit} is out of range"
-                raise wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
+                yield wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
 
     @property
     def scale(self) -> Floats:
@@ -656,24 +648,23 @@ class TerrestrialFile(CamerasFile):
             return station, station
         return self.stations.left, self.stations.right
 
-    @rule
-    def _one_geometry(self) -> None:
+    def rules(self) -> Refusals:
         if self.stations is None and len(self.cameras) > 1:
-            raise wrong("nothing says which camera stands where", code="missing-key", expected="`stations`")
+            yield wrong("nothing says which camera stands where", code="missing-key", expected="`stations`")
         left, right = self.both
         if left.free != right.free:
             message = f"the {'right' if left.free else 'left'} station has no position"
-            raise wrong(message, code="missing-key", at="stations", expected="both or none")
+            yield wrong(message, code="missing-key", at="stations", expected="both or none")
         if left.free and self.base is not None:
-            raise wrong("the base follows from the positions of the stations", at="base", fix="remove it")
+            yield wrong("the base follows from the positions of the stations", at="base", fix="remove it")
         if not left.free and self.base is None:
             expected = "`base` for the normal case, or position and alpha of both stations"
-            raise wrong("nothing says how far apart the stations are", code="missing-key", expected=expected)
+            yield wrong("nothing says how far apart the stations are", code="missing-key", expected=expected)
         if left.free and self.axes is None:
             expected = "axes: [east, north, up], or [north, east, up] where x points north"
-            raise wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
+            yield wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
         if not left.free and self.axes is not None:
-            raise wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
+            yield wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
 
 
 class ReportFrame(NamedTuple):
