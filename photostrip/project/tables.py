@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -33,7 +33,7 @@ from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
 from photostrip.project.conversion import ground_columns
-from photostrip.project.keys import Control, Models
+from photostrip.project.keys import Control, Models, Strip
 from photostrip.project.reading import Node, Reading, fault_at, form_of
 from photostrip.project.references import ListedPhoto, listed_photos, marks_of
 
@@ -180,8 +180,15 @@ def _as_listed(
             yield fault_at(root, (*path, place), message, "wrong-center", fix=fix)
 
 
-def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelStrip]) -> MeasuredModels:
-    """Bring the model coordinates of the strips into millimetres and right-handed axes."""
+def measured_models(
+    tables: ModelTables | None, given: Models | None, flights: Sequence[Strip], placed: Mapping[int, Sequence[str]]
+) -> MeasuredModels | None:
+    """Bring the model coordinates of the strips into millimetres and right-handed axes; `placed`: models of each."""
+    if tables is None or given is None:
+        return None
+    strips = [
+        ModelStrip(str(each.id), tuple(map(str, each.photos)), tuple(placed[n])) for n, each in enumerate(flights)
+    ]
     photos = [photo for strip in strips for photo in strip.photos]
     wanted = [model for strip in strips for model in strip.models]
     factor = MILLIMETRES[given.unit]
