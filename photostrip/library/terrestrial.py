@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -90,10 +91,9 @@ def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, 
     from photostrip.terrestrial.orientation import orient
 
     given, reading = read_keys(OrientationFile, path, assignments)
-    camera, sightings, sigma = only_camera(given.camera, reading), None, given.sigma_um / 1000
-    for table, findings in reading.named(("table",)):
-        sightings = read_sightings(table, given.unit, given.angles, sigma, given.measured, findings)
-    found = reading.complete(sightings)
+    camera, sigma = only_camera(given.camera, reading), given.sigma_um / 1000
+    read = partial(read_sightings, unit=given.unit, angles=given.angles, sigma=sigma, theodolite=given.measured)
+    found = reading.complete(reading.table(("table",), read))
     oriented = orient(found, camera.principal_distance, camera.principal_point, given.settings)
     return orientation_sheet(camera, found, oriented, given.settings, given.angles), reading
 
@@ -105,10 +105,8 @@ def _one_station(path: Path | None, assignments: Sequence[str]) -> Computed:
     from photostrip.terrestrial.camera_motion import one_station
 
     given, reading = read_keys(OneStationFile, path, assignments)
-    camera, measured = only_camera(given.camera, reading), None
-    for table, findings in reading.named(("table",)):
-        measured = read_one_station(table, given, camera, findings)
-    points = reading.complete(measured)
+    camera = only_camera(given.camera, reading)
+    points = reading.complete(reading.table(("table",), partial(read_one_station, given=given, camera=camera)))
     found = one_station(points, camera.principal_distance, given.attitude.rotation, given.significance)
     sheet = one_station_sheet(points, found, camera, given.attitude, given.significance)
     return Computed(sheet, reading.files, reading.findings.notes)

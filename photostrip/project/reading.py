@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -448,33 +448,32 @@ class Reading:
         """Keep a fault of a value of the file."""
         self.findings.add(fault_at(self.root, path, message, code, expected=expected, fix=fix))
 
-    def named(self, key: KeyPath) -> Iterator[tuple[str, Findings]]:
-        """Return the path of the file that a key names, and findings for it; nothing where the key names none.
+    def table(self, key: KeyPath, read: Callable[[str, Findings], T | None]) -> T | None:
+        """Read the file that a key names; None where it names none, and where there are faults."""
+        return self.tables(key, lambda paths, inner: read(paths[0], inner)) if self.root.word(*key) else None
 
-        Faults of that file as a whole are reported where it is named, those without a file at their own key.
+    def tables(self, key: KeyPath, read: Callable[[list[str], Findings], T | None]) -> T | None:
+        """Read the same of a key that names one file or a list of them.
+
+        Faults of a file as a whole are reported where it is named, those without a file at their own key.
         """
-        if self.root.word(*key):
-            for paths, inner in self.named_together(key):
-                yield paths[0], inner
-
-    def named_together(self, key: KeyPath) -> Iterator[tuple[list[str], Findings]]:
-        """Return the same for a key that names one file or a list of them."""
         node = self.root.find(*key)
         if node is None:
-            return
+            return None
         nodes = {(*key, number): each for number, each in enumerate(node.elements)} or {key: node}
         named = {path_of(each, self.file): where for where, each in nodes.items() if each.text}
         if not named:
-            return
-        inner = Findings(self.findings.notes)
-        yield list(named), inner
+            return None
 
         def placed(fault: Fault) -> Fault:
             where = named.get(fault.file, key)
             return where_named(fault, self.root, where) if fault.file else at_own_key(fault, self.root)
 
+        inner = Findings(self.findings.notes)
+        found = read(list(named), inner)
         self.findings.absorb(inner, placed)
         self.files += [path for path in named if path not in self.files]
+        return found
 
     @contextmanager
     def places(self, keys: Mapping[str, str] | None = None) -> Iterator[None]:

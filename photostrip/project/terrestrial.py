@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -161,8 +162,8 @@ def known_presets(reading: Reading | None = None) -> dict[str, Phototheodolite]:
     text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
     known = _listed(parse(text, OWN_LIST, findings), findings)
     if reading is not None:
-        for path, inner in reading.named(("presets",)):
-            known |= _listed(read_document(path, inner), reading.findings)
+        root = reading.table(("presets",), read_document)
+        known |= _listed(root, reading.findings)
     return known
 
 
@@ -431,11 +432,14 @@ def _points(
     given: Pointed, reading: Reading, layout: Sequence[Column], limits: Range, unit: str
 ) -> tuple[Points, Table | None]:
     """Read points from one of the two sources, in the unit of the limits."""
-    table = None
-    for path, findings in reading.named(("table",)):
+
+    def read(path: str, findings: Findings) -> Table | None:
         table = read_points(path, layout, findings)
         if table is not None:
             refuse_outside(table, unit, findings, given.angles)
+        return table
+
+    table = reading.table(("table",), read)
     for row, pair in enumerate(given.at):
         for column, value in enumerate(pair):
             if not limits.holds(value):
@@ -448,7 +452,7 @@ def _points(
 
 
 def read_sightings(
-    file: str, unit: str, angles: str, sigma: float, theodolite: Theodolite, findings: Findings
+    file: str, findings: Findings, unit: str, angles: str, sigma: float, theodolite: Theodolite
 ) -> Sightings | None:
     """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]``.
 
@@ -483,7 +487,7 @@ def read_sightings(
 
 
 def read_one_station(
-    file: str, given: OneStationFile, camera: Phototheodolite, findings: Findings
+    file: str, findings: Findings, given: OneStationFile, camera: Phototheodolite
 ) -> OneStation | None:
     """Read ``point,x,z,dx,dz,distance[,distance_later][,sigma][,sigma_d][,sigma_distance]``; None with faults."""
     read = read_points(file, ONE_STATION, findings)
@@ -742,9 +746,8 @@ def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, readin
     station, unit = given.both[SIDES.index(side)], given.measurements.unit
     sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * MILLIMETRES[unit]
     theodolite = Theodolite(station.sigma_arcsec, station.sigma_arcsec, 1)
-    sightings = None
-    for path, findings in reading.named(("stations", side, "directions")):
-        sightings = read_sightings(path, unit, given.angle_unit, sigma, theodolite, findings)
+    wanted = partial(read_sightings, unit=unit, angles=given.angle_unit, sigma=sigma, theodolite=theodolite)
+    sightings = reading.table(("stations", side, "directions"), wanted)
     reading.findings.stop()
     if sightings is not None:
         settings = OrientationSettings(eccentricity=station.eccentricity)
@@ -774,17 +777,17 @@ def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[P
     if measured is None:
         return None
     centre = np.array([each.principal_point for each in cameras] if len(cameras) == len(SIDES) else np.zeros((2, 2)))
-    times, series = None if given is None else _times(given, reading), None
+    times = None if given is None else _times(given, reading)
     kind = "coordinates" if measured.coordinates is not None else "pseudo_parallaxes"
-    for file, findings in reading.named(("measurements", kind)):
-        series = _read_series(file, given, measured, centre, findings)
+    read = partial(_read_series, given=given, measured=measured, centre=centre)
+    series = reading.table(("measurements", kind), read)
     if series is None or times is None or len(times) != len(series.epochs):
         return series
     return replace(series, times=np.array(times))
 
 
 def _read_series(
-    file: str, given: TerrestrialFile | None, measured: Measurements, centre: Floats, findings: Findings
+    file: str, findings: Findings, given: TerrestrialFile | None, measured: Measurements, centre: Floats
 ) -> Series | None:
     coordinates = measured.coordinates is not None
     read = (terrestrial.read_coordinates if coordinates else terrestrial.read_pseudo_parallaxes)(file, findings)
