@@ -14,11 +14,9 @@ if TYPE_CHECKING:
     from photostrip import steps
     from photostrip.errors import GeometryError, InputError, PhotostripError
     from photostrip.library.comparison import Comparison, compare
-    from photostrip.library.plan import Plan, plan
-    from photostrip.library.project import Check, Project, check, load, run
-    from photostrip.library.result import Result, read_result
-    from photostrip.library.simulation import Simulation, simulate
-    from photostrip.library.table import Table
+    from photostrip.library.project import Check, Project, Simulation, check, load, run, simulate
+    from photostrip.library.result import Result, Table, read_result
+    from photostrip.library.sheets import Plan, plan
 
 __version__ = "0.2.0"
 
@@ -26,11 +24,9 @@ __version__ = "0.2.0"
 _HOMES = {
     "errors": ("GeometryError", "InputError", "PhotostripError"),
     "library.comparison": ("Comparison", "compare"),
-    "library.plan": ("Plan", "plan"),
-    "library.project": ("Check", "Project", "check", "load", "run"),
-    "library.result": ("Result", "read_result"),
-    "library.simulation": ("Simulation", "simulate"),
-    "library.table": ("Table",),
+    "library.project": ("Check", "Project", "Simulation", "check", "load", "run", "simulate"),
+    "library.result": ("Result", "Table", "read_result"),
+    "library.sheets": ("Plan", "plan"),
 }
 __all__ = [
     "Check",

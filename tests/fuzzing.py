@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
-from photostrip.formats.output import result_files
+from photostrip.formats import result_files
 from photostrip.result.description import Columns, described
 from photostrip.simulation.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES
@@ -37,8 +37,8 @@ OVERRIDES = [
     "observations.unit=px",
     "observations.sigma=1e-9",
     "observations.sigma=1e9",
-    "control[0].sigma=[1e-9, 1, 1e9]",
-    "control[0].axes=[up, north, east]",
+    "control[0].sigma=[1e-9,1,1e9]",
+    "control[0].axes=[up,north,east]",
     "control[0].crs=EPSG:4326",
     "control[0].crs=geocentric",
     "output.crs=EPSG:3857",

@@ -171,7 +171,9 @@ def command_page() -> str:
     """Write every command with its arguments and options, as ``--help`` has them."""
     program = typer.main.get_command(PROGRAM)
     context = typer.Context(program, info_name="photostrip", resilient_parsing=True)
-    return get_docs_for_click(obj=program, ctx=context, name="photostrip", title="Reference: commands")
+    page = get_docs_for_click(obj=program, ctx=context, name="photostrip", title="Reference: commands")
+    page = re.sub(r"(?s)\*\*Commands\*\*:\n.*?(?=\n## )", "", page, count=1)
+    return re.sub(r"\x08\n(.+):\n((?:  .+\n)+)", lambda found: f"{found[1]}:\n\n```text\n{found[2]}```\n", page)
 
 
 def key_pages() -> dict[str, str]:

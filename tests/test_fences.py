@@ -26,7 +26,7 @@ FENCES = {
     "pebble": ("batch/*",),
     "pydantic": ("project/*",),
     "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
-    "rich": ("report/page/console.py", "report/page/progress.py"),
+    "rich": ("report/page/layout.py", "report/page/progress.py"),
     "typer": ("cli/*",),
     "yaml": ("project/*",),
 }

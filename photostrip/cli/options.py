@@ -8,7 +8,7 @@ from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from photostrip.report.sections.accuracy_report import SectionName
+from photostrip.report.sections.accuracy_report import NAMES
 
 Format = Literal["text", "json", "md", "github"]
 StatementFormat = Literal["text", "json", "md"]
@@ -24,6 +24,13 @@ def _keys(incomplete: str) -> list[str]:
     from photostrip.project.editors import single_keys
 
     return [f"{path}=" for path in single_keys() if path.startswith(incomplete)]
+
+
+def _sections(names: list[str] | None) -> list[str] | None:
+    for name in names or ():
+        if name not in NAMES:
+            refuse("--section", f"the report has no section '{name}', but {', '.join(NAMES)}")
+    return names
 
 
 def _page(width: int | None) -> int | None:
@@ -58,11 +65,13 @@ Verbose = Annotated[
 ]
 Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 unless the verdict is GOOD.")]
 Sections = Annotated[
-    list[SectionName] | None,
+    list[str] | None,
     typer.Option(
         "--section",
         metavar="NAME",
-        help=f"Print this section, with whole tables; may be repeated. NAME: {', '.join(SectionName)}.",
+        callback=_sections,
+        autocompletion=lambda: list(NAMES),
+        help=f"Print this section, with whole tables; may be repeated. NAME: {', '.join(NAMES)}.",
     ),
 ]
 Assignments = Annotated[
@@ -106,7 +115,7 @@ def require_target(depfile: Path | None, output: Path | None) -> None:
         refuse("--depfile", "a rule for make needs a target: give --output as well")
 
 
-def refuse_sections(names: Sequence[SectionName] | None, answer: str) -> None:
+def refuse_sections(names: Sequence[str] | None, answer: str) -> None:
     """Refuse sections where the answer (a format, or what it is) has none."""
     if names and answer not in {"text", "md"}:
         refuse("--section", f"only a report as text or Markdown has sections, not {answer}")

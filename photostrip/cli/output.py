@@ -41,32 +41,32 @@ class Messages:
 
 def ascii_only() -> bool:
     """Whether stdout can show ASCII letters only."""
-    from photostrip.report.page import console
+    from photostrip.report.page import layout
 
-    return not console.speaks_unicode(sys.stdout)
+    return not layout.speaks_unicode(sys.stdout)
 
 
 def print_json(document: Document) -> None:
     """Print a document as result.json is written."""
-    from photostrip.formats.output.result_json import to_json
+    from photostrip.formats.result_json import to_json
 
     sys.stdout.write(to_json(document, ascii_only=ascii_only()))
 
 
 def print_sections(title: str, sections: Iterable[Section], width: int | None = None, *, markdown: bool) -> None:
     """Print sections as Markdown, or as text: in colours and as wide as the terminal, where there is one."""
-    from photostrip.report.page import console, text
+    from photostrip.report.page import layout
 
     if markdown:
-        sys.stdout.write(text.to_markdown(title, sections, ascii_only=ascii_only()))
+        sys.stdout.write(layout.to_markdown(title, sections, ascii_only=ascii_only()))
     else:
-        console.print_report(title, sections, sys.stdout, width)
+        layout.print_report(title, sections, sys.stdout, width)
 
 
 def print_result(document: Document, form: Format, width: int | None, **parts: Any) -> None:  # noqa: ANN401 (of report_sections)
     """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
     from photostrip.library.result import report_of, report_sections
-    from photostrip.report.page.console import page_width
+    from photostrip.report.page.layout import page_width
 
     if form == "text":
         print_sections(*report_sections(document, width=width or page_width(), **parts), width, markdown=False)
@@ -92,7 +92,7 @@ def deliver(
 ) -> None:
     """Write a sheet, or what is drawn of it, where a file is named; print it."""
     if output is not None:
-        from photostrip.formats.text.writing import write_text
+        from photostrip.formats.files import write_text
 
         if draw is not None and output.suffix.lower() == PICTURE:
             write_text(output, draw(sheet.document()).file())
@@ -111,6 +111,6 @@ def deliver(
 def write_rule(depfile: Path | None, target: Path | str | None, files: Sequence[str | Path]) -> None:
     """Write the rule for make, if one is asked for; none of the files that were read is replaced."""
     if depfile is not None and target is not None:
-        from photostrip.formats.text.writing import make_rule, write_text
+        from photostrip.formats.files import make_rule, write_text
 
         write_text(depfile, make_rule(str(target), files), files)

@@ -49,7 +49,7 @@ def init(
     DIR gets project.yaml, observations.csv, control.csv and fiducials.csv. Nothing is overwritten: when one of the
     files exists, none is written. `photostrip check` then names what is still to be filled in.
     """
-    from photostrip.formats.text.writing import write_files
+    from photostrip.formats.files import write_files
     from photostrip.project.template import refuse_existing, template_files
 
     files = template_files(folder.resolve().name or "project")
@@ -70,7 +70,7 @@ def simulate(
     DIR gets project.yaml with its tables, and truth.json: the true coordinates, perspective centres and rotations,
     and the gross errors that were put in. The same SPEC gives the same files on every machine.
     """
-    from photostrip.library.simulation import simulated
+    from photostrip.library.project import simulated
 
     simulation = simulated(spec, assignments or [])
     simulation.write(output)
@@ -180,7 +180,7 @@ def run(
     refined.csv and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also when it is
     LOOK or UNVERIFIED. With --compare-methods and -o, each method gets a folder of its own in DIR.
     """
-    from photostrip.formats.text.writing import write_files, write_text
+    from photostrip.formats.files import write_files, write_text
     from photostrip.library.project import loaded_from
     from photostrip.library.result import RESULT
     from photostrip.notes import counted
@@ -241,7 +241,7 @@ def _compare_methods(
     when none succeeds, the first failure is raised.
     """
     from photostrip.errors import GeometryError, InputError
-    from photostrip.formats.text.writing import write_text
+    from photostrip.formats.files import write_text
     from photostrip.library.project import loaded_from
     from photostrip.pipeline.inputs import METHODS
     from photostrip.report.page.progress import progress

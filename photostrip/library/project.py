@@ -1,9 +1,9 @@
-"""A project: read from its file, or made in memory; checked and run."""
+"""A project: read from its file, made in memory or simulated; checked and run."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from os import PathLike
@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import LARGEST_FILE, from_disk
-from photostrip.formats.text.source import Source, current, digest
-from photostrip.formats.text.source import reading_from as accounted
+from photostrip.formats.files import LARGEST_FILE, Source, current, digest, from_disk
+from photostrip.formats.files import reading_from as accounted
 from photostrip.library.result import Result
 from photostrip.notes import counted
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from photostrip.project.check import Checked
     from photostrip.project.loading import Project as Loaded
 
+PROJECT_FILE, TRUTH = "project.yaml", "truth.json"  # of a simulation
 _WORD = re.compile(r"[\w-]+")
 
 
@@ -80,7 +80,7 @@ class Project:
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""
-        from photostrip.result.statement.certificate import certificate_of
+        from photostrip.result.certificate import certificate_of
 
         loaded, inputs = self.loaded, self.loaded.inputs
         grids = {Path(grid) for frame in (*computed.frames, computed.output) for grid in frame.grids}
@@ -142,7 +142,7 @@ def load(
     overrides: keys with other values than the file has: ``processing={"adjustment": "bundle"}``.
     Raises InputError with every fault of every file.
     """
-    path, source = _place_of(project, tables)
+    path, source = place_of(project, "project", tables=tables)
     return loaded_from(path, assignments_of(overrides), source)
 
 
@@ -155,7 +155,7 @@ def check(
     """Check a project without adjusting it; a faulty one raises nothing. Its arguments are those of ``load``."""
     if isinstance(project, Project):
         return (project.overridden(**overrides) if overrides else project).check()
-    path, source = _place_of(project, tables)
+    path, source = place_of(project, "project", tables=tables)
     return _checked(path, assignments_of(overrides), source)
 
 
@@ -174,17 +174,20 @@ def run(
     return load(project, tables=tables, **overrides).run()
 
 
-def _place_of(
-    project: str | PathLike[str] | Mapping[str, Any], tables: Mapping[str, Any] | None
+def place_of(
+    given: str | PathLike[str] | Mapping[str, Any],
+    name: str,
+    schema: str = "photostrip",
+    tables: Mapping[str, Any] | None = None,
 ) -> tuple[Path, Source | None]:
-    """Return the path of a project, and what it is read from where it has no files."""
-    if not isinstance(project, Mapping):
+    """Return the path of a file, and what it is read from where its content is given, called by a name in messages."""
+    if not isinstance(given, Mapping):
         if tables is not None:
-            raise InputError(Fault("tables in memory go with a project that is a mapping", "type", str(project)))
-        return Path(project), None
-    from photostrip.project.in_memory import PROJECT, source_of
+            raise InputError(Fault("tables in memory go with a project that is a mapping", "type", str(given)))
+        return Path(given), None
+    from photostrip.project.in_memory import source_of
 
-    return Path(PROJECT), source_of(PROJECT, {"photostrip": 1, **project}, tables or {})
+    return Path(name), source_of(name, {schema: 1, **given}, tables or {})
 
 
 def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
@@ -232,3 +235,73 @@ def reading_from(source: Source | None) -> AbstractContextManager[None]:
     from photostrip.project.in_memory import in_memory
 
     return in_memory(source)
+
+
+class Simulation:
+    """A simulated project: its files, and the truth that they were made from."""
+
+    def __init__(self, files: Mapping[str, str], summary: str, read: Iterable[str] = ()) -> None:
+        self.files = dict(files)
+        """Content by name: project.yaml, its tables, truth.json."""
+        self.summary = summary
+        """What was simulated, in a line."""
+        self.files_read = tuple(read)
+        """Every file that was read."""
+
+    @property
+    def truth(self) -> dict[str, Any]:
+        """The content of truth.json: true coordinates, perspective centres, rotations; the errors that were put in."""
+        from photostrip.formats.result_json import parsed
+
+        with reading_from(self._source):
+            return dict(parsed(TRUTH))
+
+    @property
+    def project(self) -> Project:
+        """The project, ready to run, without files."""
+        return loaded_from(Path(PROJECT_FILE), (), self._source)
+
+    @property
+    def _source(self) -> Source:
+        return Source({name: text.encode() for name, text in self.files.items()})
+
+    def write(self, folder: str | PathLike[str]) -> None:
+        """Write the files into a folder, as ``photostrip simulate -o`` does: all of them or none.
+
+        Raises InputError where a project stands there that no simulation wrote.
+        """
+        from photostrip.formats.files import write_files
+
+        there = Path(folder) / PROJECT_FILE
+        if there.exists() and not there.with_name(TRUTH).exists():
+            message, fix = "is no simulated project, and is not overwritten", "choose another folder, or remove it"
+            raise InputError(Fault(message, "exists", str(there), fix=fix))
+        write_files(Path(folder), self.files)
+
+    def __repr__(self) -> str:
+        """Say in a line what was simulated."""
+        return f"<Simulation: {self.summary}>"
+
+
+def simulate(
+    specification: str | PathLike[str] | Mapping[str, Any],
+    **overrides: Any,  # noqa: ANN401 (values of a specification)
+) -> Simulation:
+    """Simulate a project with known truth.
+
+    specification: a file, or its content as a mapping; ``{}`` takes every default.
+    overrides: keys with other values: ``flight={"photos": 20}, seed=3``.
+    Raises InputError with every fault of the specification.
+    """
+    path, source = place_of(specification, "specification", "photostrip_simulation")
+    with reading_from(source):
+        return simulated(path, assignments_of(overrides))
+
+
+def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
+    from photostrip.formats.simulation import project_files, summary
+    from photostrip.project.simulation import load_specification
+
+    specification = load_specification(path, assignments)
+    found = specification.simulate()
+    return Simulation(project_files(found), summary(found), specification.reading.files)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
+from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -11,18 +12,82 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.result_json import checked
+from photostrip.formats.result_json import checked
 from photostrip.notes import Document, named
+from photostrip.result import table
 
 if TYPE_CHECKING:
-    from photostrip.formats.text.writing import Content
-    from photostrip.library.table import Table
+    from numpy.typing import NDArray
+
+    from photostrip.formats.files import Content
     from photostrip.pipeline.results import Result as Computed
     from photostrip.report.page.parts import Section
     from photostrip.report.pictures.svg import Picture
+    from photostrip.result.description import Quantity
 
 ReportForm = Literal["text", "md", "html", "json"]
 RESULT, PAGE = "result.json", "report.html"
+
+
+class Table(table.Table):
+    """Columns of equal length by name: ``table["x"]`` is an array, ``len(table)`` the number of rows.
+
+    Numbers are arrays of float, NaN where there is no value; counts without gaps are int, flags without gaps bool; all
+    else are arrays of objects, None where there is none. Rows are dictionaries, with None where there is no value.
+    Arrays cannot be written to: a copy can.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        columns: Mapping[str, NDArray[Any]],
+        quantities: Mapping[str, Quantity],
+        frame: Document | None = None,
+    ) -> None:
+        super().__init__(name, columns, quantities)
+        self._frame = frame  # of its coordinates
+
+    def _with(self, columns: Mapping[str, NDArray[Any]]) -> Table:
+        return Table(self.name, columns, self.quantities, self._frame)
+
+    def to_geopandas(self) -> Any:  # noqa: ANN401 (a library that need not be there)
+        """Return points and photos as a ``geopandas.GeoDataFrame``: the data frame with a place on the map in each row.
+
+        East, north, up in the reference system of the result; of geocentric coordinates longitude, latitude, height,
+        of local ones without a system. Rows without coordinates have no place. Needs geopandas.
+        Raises InputError for a table without coordinates, and ImportError where geopandas is not installed.
+        """
+        if self._frame is None or not {"x", "y", "z"} <= set(self.columns):
+            message = f"the table {self.name} has no coordinates"
+            raise InputError(Fault(message, "no-coordinate", fix="take result.points or result.photos"))
+        try:
+            geopandas = import_module("geopandas")
+        except ModuleNotFoundError as error:
+            if error.name != "geopandas":
+                raise
+            message = "to_geopandas() needs the package geopandas, which is not installed: pip install geopandas"
+            raise ImportError(message, name="geopandas") from None
+        from photostrip.foreign.adjusted import places_on_map
+
+        places = np.column_stack([self[each] for each in "xyz"])
+        known = np.isfinite(places).all(axis=1)
+        places[known], crs = places_on_map(self._frame, places[known])
+        points = np.where(known, geopandas.points_from_xy(*places.T), None)
+        frame = geopandas.GeoDataFrame(self.to_pandas(), geometry=points, crs=crs)
+        frame.attrs["units"] = self.units
+        return frame
+
+
+def _table(name: str, meaning: str) -> cached_property[Table]:
+    """Return a property of a result that is one of its tables."""
+
+    def of(result: Result) -> Table:
+        given = result.document[name]
+        columns = {key: given[key] for key in given.columns}
+        return Table(name, columns, given.quantities, result.document["frame"])
+
+    of.__doc__ = meaning
+    return cached_property(of)
 
 
 class Result:
@@ -76,56 +141,20 @@ class Result:
         """Sigma0, scales, and the differences at control and check points."""
         return dict(self.document["summary"])
 
-    @cached_property
-    def points(self) -> Table:
-        """Adjusted points: role, coordinates, standard deviations and covariances, rays."""
-        return self._table("points")
-
-    @cached_property
-    def photos(self) -> Table:
-        """Exterior orientation of the photos: perspective centre, angles, rotation by rows, standard deviations."""
-        return self._table("photos")
-
-    @cached_property
-    def pairs(self) -> Table:
-        """Relative orientation of the pairs, or the independent models: elements, parallaxes, scale."""
-        return self._table("models")
-
-    @cached_property
-    def strips(self) -> Table:
-        """The strips: counts, scale, sigma0, deformation."""
-        return self._table("strips")
-
-    @cached_property
-    def control(self) -> Table:
-        """Given points: adjusted minus given, standard deviations."""
-        return self._table("control")
-
-    @cached_property
-    def residuals(self) -> Table:
-        """Image residuals under the final orientations, a row for each ray; y parallaxes of the pairs."""
-        return self._table("residuals")
-
-    @cached_property
-    def rejected(self) -> Table:
-        """Measurements that were taken out, with the test and the reason."""
-        return self._table("rejected")
-
-    @cached_property
-    def findings(self) -> Table:
-        """What the data say against themselves."""
-        return self._table("findings")
-
-    @cached_property
-    def notes(self) -> Table:
-        """What the numbers need beside them to be read rightly."""
-        return self._table("notes")
-
-    def _table(self, name: str) -> Table:
-        from photostrip.library.table import Table
-
-        table = self.document[name]
-        return Table(name, {key: table[key] for key in table.columns}, table.quantities, self.document["frame"])
+    points = _table("points", "Adjusted points: role, coordinates, standard deviations and covariances, rays.")
+    photos = _table(
+        "photos",
+        "Exterior orientation of photos: perspective centre, angles, rotation by rows, standard deviations.",
+    )
+    pairs = _table("models", "Relative orientation of pairs, or the independent models: elements, parallaxes, scale.")
+    strips = _table("strips", "The strips: counts, scale, sigma0, deformation.")
+    control = _table("control", "Given points: adjusted minus given, standard deviations.")
+    residuals = _table(
+        "residuals", "Image residuals under the final orientations, a row for each ray; y parallaxes of the pairs."
+    )
+    rejected = _table("rejected", "Measurements that were taken out, with the test and the reason.")
+    findings = _table("findings", "What the data say against themselves.")
+    notes = _table("notes", "What the numbers need beside them to be read rightly.")
 
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
@@ -177,18 +206,18 @@ class Result:
         everything: False for the short report that the command prints by default; the page always has everything.
         Raises InputError for a saved result that is not whole; ValueError for another form.
         """
-        from photostrip.report.sections.accuracy_report import SectionName, sections_of
-        from photostrip.result.statement.edited import as_reported, faults_of_edited
+        from photostrip.report.sections.accuracy_report import NAMES, sections_of
+        from photostrip.result.certificate import as_reported, faults_of_edited
 
         _require_form(form, get_args(ReportForm))
-        if unknown := sorted(set(sections) - set(SectionName)):
+        if unknown := sorted(set(sections) - set(NAMES)):
             message = f"the report has no section {', '.join(unknown)}"
-            raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
+            raise InputError(Fault(message, "section", expected=f"one of {', '.join(NAMES)}"))
         if self.computed is not None or form == "json":
             return report_of(self.document, form, names=sections, everything=everything)
         with faults_of_edited("reported", (self.document, self.name)):
             document = as_reported(self.document, self.name)
-            sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
+            sections_of(document)  # what is incomplete is refused, whatever is asked for
             return report_of(document, form, names=sections, everything=everything)
 
     def statement(
@@ -200,7 +229,7 @@ class Result:
         classes_cm: classes that a contract asks for, by ``plan`` and ``height``.
         Raises InputError with every reason why nothing can be stated.
         """
-        from photostrip.result.statement.accuracy_statement import statement_document
+        from photostrip.result.statement import statement_document
 
         return statement_document(self.document, self.name, classes_cm)
 
@@ -223,8 +252,8 @@ class Result:
         return page | {name: "".join(pieces) for name, pieces in self._files().items()}
 
     def _files(self) -> dict[str, Iterable[str]]:
-        from photostrip.formats.output.result_files import beside_json
-        from photostrip.formats.output.result_json import json_pieces
+        from photostrip.formats.result_files import beside_json
+        from photostrip.formats.result_json import json_pieces
 
         tables = beside_json(self.document, self._resolved, self.computed)
         return tables | {RESULT: json_pieces(self.document)}
@@ -253,7 +282,7 @@ class Result:
         """
         from pathlib import Path
 
-        from photostrip.formats.text.writing import sweep, write_files
+        from photostrip.formats.files import sweep, write_files
 
         sweep(Path(folder))
         page: dict[str, Content] = {}
@@ -299,10 +328,9 @@ def report_sections(
 ) -> tuple[str, Sequence[Section]]:
     """Return title and sections of the report; the title stands over whole reports only."""
     from photostrip.report.page.layout import USUAL
-    from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
+    from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 
-    chosen = [SectionName(each) for each in names]
-    sections = chosen_sections(document, quiet=quiet, everything=everything, names=chosen, width=width or USUAL)
+    sections = chosen_sections(document, quiet=quiet, everything=everything, names=names, width=width or USUAL)
     return "" if quiet or names else title_of(document), sections
 
 
@@ -317,7 +345,7 @@ def report_of(
     """Return the report as text, Markdown, HTML, JSON (the document) or annotations of GitHub."""
     match form:
         case "json":
-            from photostrip.formats.output.result_json import to_json
+            from photostrip.formats.result_json import to_json
 
             return to_json(document, ascii_only=ascii_only)
         case "html":
@@ -328,12 +356,12 @@ def report_of(
             from photostrip.report.page.messages import annotated, result_findings
 
             return annotated(result_findings(document))
-    from photostrip.report.page import layout, text
+    from photostrip.report.page import layout
 
     title, sections = report_sections(document, width=width, **parts)
     if form == "md":
-        return text.to_markdown(title, sections, ascii_only=ascii_only)
-    return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
+        return layout.to_markdown(title, sections, ascii_only=ascii_only)
+    return layout.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
 
 
 def _require_form(form: str, known: Sequence[str]) -> None:
@@ -349,7 +377,7 @@ def read_result(path: str | PathLike[str]) -> Result:
     """
     from pathlib import Path
 
-    from photostrip.formats.output.result_json import read_baseline
+    from photostrip.formats.result_json import read_baseline
 
     file = Path(path)
     return Result(read_baseline(str(file / RESULT if file.is_dir() else file)))

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from photostrip import steps
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.measured.steps import read_rays, read_step
+from photostrip.formats.steps import read_rays, read_step
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.local_frame import geodetic_from_geocentric
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
@@ -30,8 +30,9 @@ from photostrip.project.conversion import semi_axes
 from photostrip.project.reading import read_keys
 from photostrip.project.sections import Section
 from photostrip.report.page.parts import DASH, Facts
+from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
-from photostrip.sheets.sheet import Field, Rows, Sheet, by_columns
+from photostrip.sheets.sheet import Rows, Sheet, by_columns
 from photostrip.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
@@ -48,24 +49,6 @@ MILLION = 1e6
 TRACE = "trace_"  # before the keys of tables of a trace
 DIGITS = 10  # of values: more than any measurement has
 TEXTBOOK = "alpha-omega-kappa"  # system of the angles of [001]
-TITLES = {
-    "interior": "Interior orientation",
-    "refine": "Refined image coordinates",
-    "relative": "Relative orientation",
-    "intersection": "Space intersection",
-    "chain": "Orientation handed on along a strip",
-    "scale": "Scale transfer",
-    "strip": "Strip in model coordinates",
-    "absolute": "Absolute orientation",
-    "polynomial": "Polynomial",
-    "resection": "Space resection",
-    "bundle": "Bundle adjustment",
-    "frame": "Intermediate frame",
-    "curvature": "Earth curvature",
-    "pair-scales": "Scales of pairs of points",
-    "closed-form": "Errors of points in closed form",
-    "deformation": "Deformation of a model",
-}
 
 _COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
 _EXCHANGED = str.maketrans("XxYy", "YyXx")  # where the base lies along Y
@@ -74,11 +57,11 @@ _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
 
 def step(name: StepName, file: str, assignments: Sequence[str], *, trace: bool = False) -> Sheet:
     """Compute a step from its table, with the equations and their numbers if a trace is wanted."""
-    kind, computed = _STEPS[name]
+    title, kind, computed = _STEPS[name]
     given: Any = read_keys(kind, None, assignments)[0]
     sheet = computed(file, given)
     shown = [each for each in sheet.tables if trace or not each.key.startswith(TRACE)]
-    return replace(sheet, title=TITLES[name], tables=shown)
+    return replace(sheet, title=title, tables=shown)
 
 
 def _interior(file: str, given: keys.InteriorKeys) -> Sheet:
@@ -365,14 +348,15 @@ def _frame(file: str, given: keys.FrameKeys) -> Sheet:
 
 def _curvature(file: str, given: keys.CurvatureKeys) -> Sheet:
     ids, (xyz,) = read_step(file, "curvature")
-    fall = steps.curvature(xyz, radius=given.radius)
+    radius = given.radius_of_strip
+    fall = steps.curvature(xyz, radius=radius)
     distance = np.hypot(*(xyz[:, :2] - xyz[:, :2].mean(axis=0)).T)
     listed: list[Column] = [(Field("D", "m 1"), distance), (Field("D2/2R", "m 4"), fall)]
     listed += [(Field("reduced", "m 4"), xyz[:, 2] - fall), (Field("raised", "m 4"), xyz[:, 2] + fall)]
     words = (
         "D from the middle of the points; reduced: z of control before the strip; raised: z of results after; eq. 153"
     )
-    return _sheet("curvature", [_value("R", given.radius, "m")], ids, listed, _equations(words))
+    return _sheet("curvature", [_value("R", radius, "m")], ids, listed, _equations(words))
 
 
 def _pair_scales(file: str, given: keys.PairScalesKeys) -> Sheet:
@@ -418,23 +402,23 @@ def _deformation(file: str, given: keys.DeformationKeys) -> Sheet:
     return _sheet("deformation", values, ids, listed, _equations(words))
 
 
-_STEPS: dict[StepName, tuple[type[Section], Callable[[str, Any], Sheet]]] = {
-    "interior": (keys.InteriorKeys, _interior),
-    "refine": (keys.RefineKeys, _refine),
-    "relative": (keys.RelativeKeys, _relative),
-    "intersection": (keys.IntersectionKeys, _intersection),
-    "chain": (keys.TurnedKeys, _chain),
-    "scale": (keys.StepKeys, _scale),
-    "strip": (keys.StripKeys, _strip),
-    "absolute": (keys.AbsoluteKeys, _absolute),
-    "polynomial": (keys.PolynomialKeys, _polynomial),
-    "resection": (keys.ResectionKeys, _resection),
-    "bundle": (keys.BundleKeys, _bundle),
-    "frame": (keys.FrameKeys, _frame),
-    "curvature": (keys.CurvatureKeys, _curvature),
-    "pair-scales": (keys.PairScalesKeys, _pair_scales),
-    "closed-form": (keys.ClosedFormKeys, _closed_form),
-    "deformation": (keys.DeformationKeys, _deformation),
+_STEPS: dict[StepName, tuple[str, type[Section], Callable[[str, Any], Sheet]]] = {
+    "interior": ("Interior orientation", keys.InteriorKeys, _interior),
+    "refine": ("Refined image coordinates", keys.RefineKeys, _refine),
+    "relative": ("Relative orientation", keys.RelativeKeys, _relative),
+    "intersection": ("Space intersection", keys.IntersectionKeys, _intersection),
+    "chain": ("Orientation handed on along a strip", keys.TurnedKeys, _chain),
+    "scale": ("Scale transfer", keys.StepKeys, _scale),
+    "strip": ("Strip in model coordinates", keys.StripKeys, _strip),
+    "absolute": ("Absolute orientation", keys.AbsoluteKeys, _absolute),
+    "polynomial": ("Polynomial", keys.PolynomialKeys, _polynomial),
+    "resection": ("Space resection", keys.ResectionKeys, _resection),
+    "bundle": ("Bundle adjustment", keys.BundleKeys, _bundle),
+    "frame": ("Intermediate frame", keys.FrameKeys, _frame),
+    "curvature": ("Earth curvature", keys.CurvatureKeys, _curvature),
+    "pair-scales": ("Scales of pairs of points", keys.PairScalesKeys, _pair_scales),
+    "closed-form": ("Errors of points in closed form", keys.ClosedFormKeys, _closed_form),
+    "deformation": ("Deformation of a model", keys.DeformationKeys, _deformation),
 }
 
 

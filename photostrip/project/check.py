@@ -16,11 +16,10 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.measured.control import ControlTable
-from photostrip.formats.measured.measurements import Measurements
-from photostrip.formats.measured.models import ModelTable
-from photostrip.formats.text.findings import Findings
-from photostrip.formats.text.tables import Table
+from photostrip.formats.faults import Findings
+from photostrip.formats.measured import ControlTable, Measurements
+from photostrip.formats.models import ModelTable
+from photostrip.formats.tables import Table
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted, listed

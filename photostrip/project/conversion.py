@@ -15,9 +15,7 @@ import numpy as np
 from photostrip import camera
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.measured.control import ControlTable
-from photostrip.formats.measured.exterior import QUATERNION, ROTATIONS
-from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.measured import QUATERNION, ROTATIONS, ControlTable, Measurements
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84, GroundFrame
 from photostrip.geodesy.local_frame import mean_radius, radius_in_azimuth
@@ -51,7 +49,7 @@ from photostrip.strip.formed_strip import StripFormationSettings
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+    from photostrip.formats.measured import OrientationTable, PositionTable
     from photostrip.project.keys import Processing, ProjectFile
 
 T = TypeVar("T", bound="DataclassInstance")

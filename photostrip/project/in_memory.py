@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.text.source import Source, reading_from
+from photostrip.formats.files import Source, reading_from
+from photostrip.formats.result_files import to_csv
 
 if TYPE_CHECKING:
     from photostrip.notes import Finding, Note

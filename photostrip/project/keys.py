@@ -13,17 +13,19 @@ from pydantic import Discriminator, Tag
 
 from photostrip import camera
 from photostrip.errors import Fault, InputError
-from photostrip.formats.measured.control import CONTROL
-from photostrip.formats.measured.exterior import POSITIONS, ROTATIONS, orientation_columns
-from photostrip.formats.measured.models import MODEL_CENTERS, MODEL_POINTS
-from photostrip.formats.measured.observations import FIDUCIALS, OBSERVATIONS
-from photostrip.formats.measured.pairs import LAYOUTS
-from photostrip.formats.measured.repeated import POLICIES
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import shown
-from photostrip.formats.text.table_reader import WORDS
-from photostrip.formats.text.table_text import MOST_LINES
-from photostrip.formats.text.tables import Column
+from photostrip.formats.faults import shown, suggestion
+from photostrip.formats.measured import (
+    CONTROL,
+    FIDUCIALS,
+    LAYOUTS,
+    OBSERVATIONS,
+    POLICIES,
+    POSITIONS,
+    ROTATIONS,
+    orientation_columns,
+)
+from photostrip.formats.models import MODEL_CENTERS, MODEL_POINTS
+from photostrip.formats.tables import MOST_LINES, WORDS, Column
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.network.problem import ASKED, SCREENINGS, TESTS
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings

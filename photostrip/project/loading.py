@@ -13,9 +13,9 @@ import numpy as np
 
 from photostrip.arrays import Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.measured.measurements import Measurements
-from photostrip.formats.text.findings import Findings
-from photostrip.formats.text.source import current, seen_from
+from photostrip.formats.faults import Findings
+from photostrip.formats.files import current, seen_from
+from photostrip.formats.measured import Measurements
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame

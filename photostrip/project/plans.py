@@ -9,9 +9,9 @@ import numpy as np
 
 from photostrip.camera import Camera
 from photostrip.errors import InputError
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import LARGEST_NUMBER
-from photostrip.geodesy.local_frame import EARTH_RADIUS
+from photostrip.formats.faults import LARGEST_NUMBER, suggestion
+from photostrip.geodesy.ground_frame import WGS84
+from photostrip.geodesy.local_frame import EARTH_RADIUS, radius_in_azimuth
 from photostrip.planning import camera_efficiency
 from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, HighGround
 from photostrip.planning.ideal_strip import BUNDLE, LEAST_PHOTOS, METHODS, USES, ControlLayout, Spot, StripGeometry
@@ -742,7 +742,17 @@ class FrameKeys(StepKeys):
 class CurvatureKeys(StepKeys):
     """The Earth's curvature below plane coordinates, from their middle."""
 
-    radius: Positive = key("Of the Earth in the direction of the strip", EARTH_RADIUS, unit="m")
+    radius: Positive = key("Of the Earth, without a latitude", EARTH_RADIUS, unit="m")
+    latitude: Annotated[Number, Range(-90.0, 90.0, "deg")] | None = key(
+        "Of the strip: the radius of WGS 84 in its azimuth counts", None, unit="deg"
+    )
+    azimuth: Annotated[Number, Range(-360.0, 360.0, "deg")] = key("Of the strip, clockwise from north", 0.0, unit="deg")
+
+    @property
+    def radius_of_strip(self) -> float:
+        if self.latitude is None:
+            return self.radius
+        return float(radius_in_azimuth(np.radians(self.latitude), np.radians(self.azimuth), WGS84))
 
 
 class ClosedFormKeys(StepKeys):

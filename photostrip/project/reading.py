@@ -20,12 +20,10 @@ import yaml
 from pydantic import ValidationError
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import BYTE_ORDER_MARK, MEGABYTE, decode, read_bytes
-from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
-from photostrip.formats.text.table_reader import WORDS
-from photostrip.formats.text.table_text import Form
+from photostrip.formats.faults import Findings, NotANumber, shown, suggestion
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.files import BYTE_ORDER_MARK, MEGABYTE, decode, read_bytes
+from photostrip.formats.tables import WORDS, Form
 from photostrip.notes import Note, counted
 from photostrip.project.sections import Section, WrongValueError, WrongValuesError, bare, is_section, kinds_of, wrong
 

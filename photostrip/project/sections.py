@@ -14,10 +14,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, Union, get_args, 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, model_validator
 from pydantic_core import core_schema
 
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
-from photostrip.formats.text.tables import CONTROL_CHARACTER
+from photostrip.formats.faults import SMALLEST_LENGTH, NotANumber, shown, suggestion
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 
 Before = BeforeValidator

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from photostrip import camera, simulation
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import shown
+from photostrip.formats.faults import shown, suggestion
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.keys import CRS, UNDULATION, Distortion, Ellipsoid, Unit
 from photostrip.project.reading import Reading, read_file

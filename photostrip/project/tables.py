@@ -15,20 +15,22 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
-from photostrip.formats.measured.exterior import (
+from photostrip.formats.faults import Findings, NotANumber, meant, suggestion
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.measured import (
     ROTATIONS,
+    ControlTable,
+    Manner,
+    Measurements,
     OrientationTable,
     PositionTable,
+    read_control,
+    read_measurements,
     read_orientations,
     read_positions,
+    refuse_repeated,
 )
-from photostrip.formats.measured.measurements import Measurements
-from photostrip.formats.measured.models import ModelTable, correlations, read_models
-from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings, meant, suggestion
-from photostrip.formats.text.numbers import NotANumber
-from photostrip.formats.text.numbers import number as read_number
+from photostrip.formats.models import ModelTable, correlations, read_models
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip

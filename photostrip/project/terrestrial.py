@@ -14,11 +14,10 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import Fault
-from photostrip.formats.measured import terrestrial
-from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, ONE_STATION, SIGHTINGS, read_points
-from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import shown
-from photostrip.formats.text.tables import Column, Table
+from photostrip.formats import terrestrial
+from photostrip.formats.faults import Findings, shown, suggestion
+from photostrip.formats.tables import Column, Table
+from photostrip.formats.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, ONE_STATION, SIGHTINGS, read_points
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate

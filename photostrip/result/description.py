@@ -24,6 +24,7 @@ LEFT_OUT = (
     "correlations",
     "fiducial_marks",
 )
+FIELDS = re.compile(r" \|(?= |$)")
 BRACES = re.compile(r"\{([^}]*)\}")
 
 
@@ -42,6 +43,10 @@ class Quantity:
     derived: bool = False  # whether other columns tell it: it does not stand in result.json
     # kind of tolerance by which two results are compared; name: a column that names its rows; empty: not compared
     compared: str = ""
+    head: str = ""  # of its column in reports; * stands for the axis of the frame
+    shown: str = ""  # how reports print it, as ``page.tables`` reads it; empty: as usual for its unit
+    below: str = ""  # second line of the head, in place of the unit
+    angles: str = ""  # unit in which reports print an angle
 
     @classmethod
     def of(cls, form: str, meaning: str) -> Quantity:
@@ -87,13 +92,16 @@ def _everything() -> Block:
             for place in places:
                 place.optional = line.endswith("?")
         elif line and not line.startswith("#"):
-            keys, form, meaning, *compared = line.split(" | ")
-            entry = replace(Quantity.of(form, meaning), optional=keys[-1] in "?*", compared="".join(compared))
-            entry = replace(entry, derived=keys.endswith("*"))
-            for path in _expanded(keys.rstrip("?*")):
+            keys, form, meaning, *more = (part.strip() for part in FIELDS.split(line))
+            compared, head, shown, below, *_ = *more, *[""] * 4
+            entry = replace(Quantity.of(form, meaning), optional=keys[-1] in "?*", derived=keys.endswith("*"))
+            heads = list(_expanded(head))
+            for number, path in enumerate(_expanded(keys.rstrip("?*"))):
                 above, _, last = path.rpartition(".")
+                head = heads[number % len(heads)]
+                own = replace(entry, compared=compared, head=head, shown=shown, below=below)
                 for place in places:
-                    (_made(place, above, Block) if above else place)[last] = entry
+                    (_made(place, above, Block) if above else place)[last] = own
     return found
 
 

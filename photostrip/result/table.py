@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, block_at
-from photostrip.result.numbers import plain
-from photostrip.result.quantities import angle_decimals, coordinate_decimals, rounded_column
+from photostrip.result.numbers import angle_decimals, coordinate_decimals, plain, rounded_column
 
 SHOWN = 10  # rows in a notebook
 TEXTS = {"text", "word"}
@@ -146,12 +145,17 @@ class Table:
         return self._with(self._columns | {key: others[key] for key in others.columns})
 
     def in_frame(self, frame: Document, angles: Document) -> Self:
-        """Return the table with the units and decimals of coordinates and angles that its result has."""
+        """Return the table with the units, decimals and axes of coordinates and angles that its result has."""
         lengths = dict(zip("xyz", coordinate_decimals(frame), strict=True))
         known = dict(zip("xyz", (frame["plan_unit"], frame["plan_unit"], frame["height_unit"]), strict=True))
+        axes = dict(zip("xyz123", (*frame["axes"], *frame["axes"]), strict=True))
         entries = dict(self.quantities)
         for name, entry in entries.items():
-            if entry.unit == "frame":
+            if "*" in entry.head:
+                entries[name] = replace(entry, head=entry.head.replace("*", axes[name[-1]]))
+            elif entry.unit in {"deg", "arcsec"}:
+                entries[name] = replace(entry, angles=angles["unit"])
+            elif entry.unit == "frame":
                 entries[name] = replace(entry, unit=UNITS.get(known[name], known[name]), decimals=lengths[name])
             elif entry.unit == "angle":
                 decimals = angle_decimals(angles["unit"]) if entry.digits is None else None
@@ -219,8 +223,13 @@ def as_array(entry: Quantity, values: Sequence[Any] | NDArray[Any]) -> NDArray[A
 def in_frame(document: Document) -> Document:
     """Give the tables of a document the units and decimals of its coordinates and angles."""
     frame, angles = document["frame"], document["angles"]
-    tables = {key: value.in_frame(frame, angles) for key, value in document.items() if isinstance(value, Table)}
-    return document | tables
+
+    def placed(value: Any) -> Any:  # noqa: ANN401 (any part of a document)
+        if isinstance(value, Table):
+            return value.in_frame(frame, angles)
+        return {key: placed(each) for key, each in value.items()} if isinstance(value, dict) else value
+
+    return {key: placed(value) for key, value in document.items()}
 
 
 def _is_column(value: object) -> bool:

@@ -13,7 +13,8 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import counted
 from photostrip.report.page.parts import DASH, Part, Words
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, by_columns, fields, plain, written
+from photostrip.report.page.tables import Cell, Field, fields, written
+from photostrip.sheets.sheet import Fact, Rows, Sheet, by_columns, plain
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.accuracy import Theodolite
 from photostrip.terrestrial.normal_case import (

@@ -11,9 +11,10 @@ from photostrip.arrays import Floats
 from photostrip.notes import counted
 from photostrip.project.terrestrial import ReportFrame, Survey
 from photostrip.report.page.parts import DASH, Words
+from photostrip.report.page.tables import Cell, Field, fields
 from photostrip.result.numbers import natural_rank
 from photostrip.sheets.directions import camera_facts
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, plain
+from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden, plain
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import OneStation, OneStationResult
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
@@ -230,11 +231,11 @@ def _epochs(result: Monitoring, frame: ReportFrame) -> Iterator[Rows]:
 def _positions(result: Monitoring, frame: ReportFrame) -> Rows:
     """Give the coordinates of all points in all epochs."""
     order = list(frame.order)
-    names = ("x", "y", "z", "sigma_x", "sigma_y", "sigma_z")
     columns = (
-        Field("point", shown=False),
-        Field("epoch", shown=False),
-        *(Field(name, "m 4", shown=False) for name in names),
+        Field("point"),
+        Field("epoch"),
+        *(Field(axis, "m 3", name) for axis, name in zip("xyz", frame.axes, strict=True)),
+        *fields("sigma_x sigma_y sigma_z", "m 4", "± ± ±"),
     )
     rows = [
         (
@@ -247,7 +248,7 @@ def _positions(result: Monitoring, frame: ReportFrame) -> Rows:
         for row in _points(result)
         for number, epoch in enumerate(result.series.epochs)
     ]
-    return Rows("positions", "", (*columns, Field("parallax_um", "um 2", shown=False)), rows)
+    return Rows("positions", "Positions", (*columns, Field("parallax_um", "um 1", "p vertical")), rows)
 
 
 def _rates(result: Monitoring, frame: ReportFrame) -> Rows:

@@ -9,7 +9,8 @@ from typing import Any
 from photostrip.errors import PhotostripError
 from photostrip.notes import Document
 from photostrip.report.page.parts import Words
-from photostrip.sheets.sheet import Fact, Field, Rows, Sheet, hidden
+from photostrip.report.page.tables import Field
+from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden
 
 ROLES, PARTS = ("check", "control"), ("plan", "height")
 LEFT_OVER = (

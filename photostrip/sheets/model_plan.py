@@ -17,8 +17,9 @@ from photostrip.planning.closed_form import ORDER
 from photostrip.planning.deformation import DEFORMATION_TERMS, base_frame_elements, relative_errors
 from photostrip.planning.model_plan import BothForms, Forecast, GivenErrors, ModelSpec, NamedPoint, simple_accuracy
 from photostrip.planning.single_model import ELEMENTS, FREE, PARAMETERS
+from photostrip.report.page.tables import Cell, Field, fields, with_unit
 from photostrip.result.numbers import rms
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, by_columns, fields, hidden, plain, with_unit
+from photostrip.sheets.sheet import Fact, Rows, Sheet, by_columns, hidden, plain
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
@@ -328,6 +329,7 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
     )
     heights = {
         "c_um": "What the elements add to the x parallax, c of eq. 10.9, µm",
+        "py_um": "y parallaxes that they leave, µm",
         "raised_z_m": "Height errors before levelling, dZ, m",
         "left_z_m": "Height errors that the absolute orientation leaves, m",
         "left_x_m": "Errors along the flight that it leaves, m",
@@ -340,10 +342,17 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
         (
             Field("x_mm", "mm 0"),
             Field("y_mm", "mm 0", "y \\ x"),
-            Field("c_um", "um +1", heights["c_um"]),
+            *(Field(key, "um +1", heights[key]) for key in ("c_um", "py_um")),
             *(Field(key, "m +3", heights.get(key), shown=key in heights) for key in keys),
         ),
-        by_columns(places[:, 0].tolist(), places[:, 1], bent.c * MICROMETRES, bent.raised * unit, bent.left * unit),
+        by_columns(
+            places[:, 0].tolist(),
+            places[:, 1],
+            bent.c * MICROMETRES,
+            bent.parallax * MICROMETRES,
+            bent.raised * unit,
+            bent.left * unit,
+        ),
         across="x_mm",
         tables=tuple(heights),
     )

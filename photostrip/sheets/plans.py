@@ -8,7 +8,8 @@ import numpy as np
 
 from photostrip.planning.camera_efficiency import ComparedCamera, FlownSurvey, by_efficiency, compare, suitability
 from photostrip.planning.screening import ARC_MINUTES, ScreeningOutcome
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden
+from photostrip.report.page.tables import Cell, Field, fields
+from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden, listed
 from photostrip.strip.relative_orientation import ELEMENTS
 from photostrip.terrestrial.accuracy import PLACES, DisplacementSpec, plan_displacements
 from photostrip.units import MICROMETRES
@@ -31,53 +32,38 @@ def camera_sheet(
         ),
         Fact("reference", reference.name, text=f"{reference.name}: all ratios are to it", label="beside"),
     ]
-    beside = [(camera, compare(camera, reference)) for camera in cameras]
+    beside = {camera.name: compare(camera, reference) for camera in cameras}
     tables = [
-        Rows(
+        listed(
             "cameras",
             "",
             (
-                Field("camera"),
-                Field("principal_distance_mm", "mm g9", "f"),
-                Field("sigma_um", "um 1", "m_p"),
-                Field("coefficient_mm2", "mm² 3", "K = f m_p"),
+                Field("camera", of="name"),
+                Field("principal_distance_mm", "mm g9", "f", of="focal"),
+                Field("sigma_um", "um 1", "m_p", of=lambda camera: camera.sigma * MICROMETRES),
+                Field("coefficient_mm2", "mm² 3", "K = f m_p", of="coefficient"),
                 Field("height_ratio", "ratio 0", "H/m_h"),
-                Field("eta_height", "ratio 3", "m_h", "equal area"),
-                Field("scale_ratio", "ratio 3", "scale", "equal m_h"),
-                Field("eta_area_printed", "ratio 3", "area", "printed"),
-                Field("eta_area", "ratio 3", "area", "equal m_h"),
-                Field("photos_ratio", "ratio 3", "photos", "equal m_h"),
-                *hidden("base_mm", "useful_width_mm", form="mm 1"),
-                *hidden("rank"),
+                Field("eta_height", "ratio 3", "m_h", "equal area", of=lambda camera: beside[camera.name].height_error),
+                Field("scale_ratio", "ratio 3", "scale", "equal m_h", of=lambda camera: beside[camera.name].scale),
+                Field("eta_area_printed", "ratio 3", "area", "printed", of=lambda at: beside[at.name].printed_area),
+                Field("eta_area", "ratio 3", "area", "equal m_h", of=lambda camera: beside[camera.name].area),
+                Field("photos_ratio", "ratio 3", "photos", "equal m_h", of=lambda camera: beside[camera.name].photos),
+                Field("base_mm", "mm 1", shown=False, of="base"),
+                Field("useful_width_mm", "mm 1", shown=False, of="width"),
+                Field("rank", shown=False, of=lambda camera: order.index(camera.name) + 1),
             ),
-            [
-                (
-                    each.name,
-                    each.focal,
-                    each.sigma * MICROMETRES,
-                    each.coefficient,
-                    each.height_ratio,
-                    other.height_error,
-                    other.scale,
-                    other.printed_area,
-                    other.area,
-                    other.photos,
-                    each.base,
-                    each.width,
-                    order.index(each.name) + 1,
-                )
-                for each, other in beside
-            ],
+            cameras,
         ),
-        Rows(
+        listed(
             "models",
             "Their models",
             (
-                Field("camera"),
-                *fields("base_mm useful_width_mm", "mm 1", "base useful_width"),
-                Field("base_ratio", "ratio 2", "f/b"),
+                Field("camera", of="name"),
+                Field("base_mm", "mm 1", "base", of="base"),
+                Field("useful_width_mm", "mm 1", "useful width", of="width"),
+                Field("base_ratio", "ratio 2", "f/b", of=lambda camera: camera.focal / camera.base),
             ),
-            [(each.name, each.base, each.width, each.focal / each.base) for each in cameras],
+            cameras,
         ),
     ]
     if survey is not None:
@@ -89,12 +75,9 @@ def _survey(
     cameras: Sequence[ComparedCamera], survey: FlownSurvey, order: Sequence[str], facts: list[Fact]
 ) -> Iterator[Rows]:
     """Give what each camera does in one survey, and which of them takes its terrain."""
-    terrain, flown = survey.terrain, [survey.flown(camera) for camera in cameras]
-    suited = [suitability(camera, survey) for camera in cameras]
-    best = next(
-        (name for name in order for each, fit in zip(cameras, suited, strict=True) if each.name == name and fit.suits),
-        None,
-    )
+    terrain, flown = survey.terrain, {camera.name: survey.flown(camera) for camera in cameras}
+    suited = {camera.name: suitability(camera, survey) for camera in cameras}
+    best = next((name for name in order if suited[name].suits), None)
     slope = float(np.degrees(terrain.slope))
     asked = bool(terrain.relief or terrain.slope)
     facts += [
@@ -111,49 +94,38 @@ def _survey(
             else "",
         ),
     ]
-    yield Rows(
+    yield listed(
         "survey",
         "What heights and areas cost",
         (
-            Field("camera"),
-            Field("scale", "ratio g4"),
-            Field("flying_height_m", "m 0", "H"),
-            Field("sigma_z_m", "m 3", "m_h"),
-            Field("area_km2", "km² g4", "area S"),
-            Field("sigma_z_per_area_m_km2", "m/km² g4", "m_h/S"),
-            Field("photos_per_100_km2", "ratio 0", "photos", "per 100 km²"),
+            Field("camera", of=lambda name: name),
+            Field("scale", "ratio g4", of=lambda name: Cell(f"1:{flown[name].scale:.0f}", flown[name].scale)),
+            Field("flying_height_m", "m 0", "H", of=lambda name: flown[name].flying_height),
+            Field("sigma_z_m", "m 3", "m_h", of=lambda name: flown[name].height_sigma),
+            Field("area_km2", "km² g4", "area S", of=lambda name: flown[name].area),
+            Field(
+                "sigma_z_per_area_m_km2",
+                "m/km² g4",
+                "m_h/S",
+                of=lambda name: flown[name].height_sigma / flown[name].area,
+            ),
+            Field("photos_per_100_km2", "ratio 0", "photos", "per 100 km²", of=lambda name: 100 / flown[name].area),
         ),
-        [
-            (
-                camera.name,
-                Cell(f"1:{each.scale:.0f}", each.scale),
-                each.flying_height,
-                each.height_sigma,
-                each.area,
-                each.height_sigma / each.area,
-                100 / each.area,
-            )
-            for camera, each in zip(cameras, flown, strict=True)
-        ],
+        flown,
         note="S: what a model covers, of its useful width",
     )
-    yield Rows(
+    yield listed(
         "terrain_limits",
         "What the cameras take of the terrain",
         (
-            Field("camera"),
-            Field("lap_at_highest_percent", "percent 1", "overlap", "highest, %"),
-            Field("largest_relief_m", "m 0", "relief", "largest, m"),
-            Field("steepest_slope_deg", "deg 1", "slope", "steepest, °"),
-            Field("least_principal_distance_mm", "mm 1", "f", "least, mm"),
-            Field("suits", head="takes it"),
+            Field("camera", of=lambda name: name),
+            Field("lap_at_highest_percent", "percent 1", "overlap", "highest, %", of=lambda at: 100 * suited[at].lap),
+            Field("largest_relief_m", "m 0", "relief", "largest, m", of=lambda name: suited[name].relief),
+            Field("steepest_slope_deg", "deg 1", "slope", "steepest, °", of=lambda at: np.degrees(suited[at].slope)),
+            Field("least_principal_distance_mm", "mm 1", "f", "least, mm", of=lambda name: suited[name].least_focal),
+            Field("suits", head="takes it", of=lambda name: suited[name].suits),
         ),
-        [
-            (camera.name, 100 * fit.lap, fit.relief, float(np.degrees(fit.slope)), fit.least_focal, fit.suits)
-            for camera, fit in zip(cameras, suited, strict=True)
-        ]
-        if asked
-        else [],
+        suited if asked else (),
         note="least f: of a camera with this format and base",
     )
 
@@ -246,27 +218,20 @@ def screening_sheet(name: str, outcome: ScreeningOutcome) -> Sheet:
         Fact("grubbs_alpha", spec.grubbs_alpha),
     ]
     limit = f"limit {spec.parallax_limit * MICROMETRES:.4g} µm, {100 * spec.grubbs_alpha:g} %"
-    methods = Rows(
+    methods = listed(
         "methods",
         "Methods",
         (
             Field("method"),
-            Field("parallax_percent", "percent 1", "by parallax"),
-            Field("later_percent", "percent 1", "by later tests"),
-            Field("missed_percent", "percent 1", "missed"),
-            *fields("beside_percent instead_percent", "percent 1", "beside instead", "good lost, %"),
-            Field("mean_change_arcmin", "arcmin 1", "change", "mean, ′"),
-            Field("worst_change_arcmin", "arcmin 1", "change", "worst, ′"),
+            Field("parallax_percent", "percent 1", "by parallax", of=lambda method: 100 * method.parallax),
+            Field("later_percent", "percent 1", "by later tests", of=lambda method: 100 * method.later),
+            Field("missed_percent", "percent 1", "missed", of=lambda method: 100 * method.missed),
+            Field("beside_percent", "percent 1", "beside", "good lost, %", of=lambda method: 100 * method.beside),
+            Field("instead_percent", "percent 1", "instead", "good lost, %", of=lambda method: 100 * method.instead),
+            Field("mean_change_arcmin", "arcmin 1", "change", "mean, ′", of=lambda at: at.mean_change * ARC_MINUTES),
+            Field("worst_change_arcmin", "arcmin 1", "change", "worst, ′", of=lambda at: at.worst_change * ARC_MINUTES),
         ),
-        [
-            (
-                each.method,
-                *(100 * share for share in (each.parallax, each.later, each.missed, each.beside, each.instead)),
-                each.mean_change * ARC_MINUTES,
-                each.worst_change * ARC_MINUTES,
-            )
-            for each in outcome.methods
-        ],
+        outcome.methods,
         note=f"in % of the errors; good points are lost beside wrong ones that are found, or instead of one that stays;"
         f" parallax+grubbs: {limit}; change: largest of the elements in pairs that kept an error",
     )
@@ -310,9 +275,10 @@ def _shares(outcome: ScreeningOutcome, key: str) -> Rows:
             for method, name in counted_by
         ]
         rows.append((value * factor, errors, *shares))
-    columns = (Field("", "percent 1", *each) for each in heads)
+    columns = (Field(f"{name}_{below}_percent".replace("__", "_"), "percent 1", name, below) for name, below in heads)
     title = f"Found, % of the errors of a {key}"
-    return Rows("", title, (Field("", "ratio g4", head), Field("", "count", "errors"), *columns), rows)
+    first = Field("zone" if key == "zone" else "size_um", "ratio g4", head)
+    return Rows(f"by_{key}", title, (first, Field("errors", "count"), *columns), rows)
 
 
 def _effects(outcome: ScreeningOutcome, sizes: Sequence[float]) -> Rows:

@@ -9,42 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, NamedTuple
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.result_files import to_csv
 from photostrip.notes import Document
-from photostrip.report.page.layout import USUAL
-from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
-from photostrip.report.page.text import to_markdown, to_text
+from photostrip.report.page.layout import USUAL, to_markdown, to_text
+from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import Cell, Field, tabulated, with_unit, written
 
 MORE_DECIMALS, MORE_DIGITS = 3, 4  # of JSON and CSV, that are not printed
-PRINTED = {"um": "µm", "arcsec": "″", "arcmin": "′", "percent": "%", "ratio": ""}  # units
-
-
-class Cell(NamedTuple):
-    """A value that is printed in its own way."""
-
-    text: str
-    value: Any  # in JSON and CSV
-
-
-def written(value: Any, form: str = "") -> str:  # noqa: ANN401 (whatever stands in a cell)
-    """Return a value as it is printed, without its unit."""
-    if isinstance(value, Cell | str):
-        return value if isinstance(value, str) else value.text
-    if isinstance(value, list | tuple | np.ndarray):
-        return " ".join(written(each, form) for each in value)
-    if isinstance(value, bool | np.bool):
-        return "yes" if value else "no"
-    if value is None or not isfinite(value):
-        return DASH
-    spec = form.rpartition(" ")[2] if " " in form else ""
-    if not spec:
-        return str(value)
-    return f"{value:.{spec[1:]}{spec[0]}}" if spec[0] in "eg" else f"{value:{spec.rstrip('0123456789')}z.{int(spec)}f}"
 
 
 def plain(value: Any, form: str = "") -> Any:  # noqa: ANN401 (the same)
@@ -67,13 +44,6 @@ def plain(value: Any, form: str = "") -> Any:  # noqa: ANN401 (the same)
     return found + 0.0 if isfinite(found) else None
 
 
-def with_unit(value: Any, form: str) -> str:  # noqa: ANN401 (the same)
-    """Return a number as it is printed, with its unit."""
-    name = form.rpartition(" ")[0]
-    unit = PRINTED.get(name, name)
-    return written(value, form) + (f" {unit}" if unit and unit not in "″′" else unit)
-
-
 @dataclass(frozen=True)
 class Fact:
     """A label with its value; without a form or a text of its own it stands in JSON alone."""
@@ -89,44 +59,14 @@ class Fact:
         return self.text or (with_unit(self.value, self.form) if self.form else "")
 
 
-@dataclass(frozen=True)
-class Field:
-    """A column: its key in JSON and CSV, the form of its numbers, its head in print; empty for words."""
-
-    key: str
-    form: str = ""
-    head: str | None = None  # None: the key
-    below: str | None = None  # second line of the head; None: the unit
-    rank: int = 0
-    shown: bool = True
-
-    @property
-    def name(self) -> str:
-        return self.key.replace("_", " ") if self.head is None else self.head
-
-    @property
-    def unit(self) -> str:
-        unit = self.form.rpartition(" ")[0]
-        return PRINTED.get(unit, unit)
-
-    @property
-    def column(self) -> Column:
-        return Column(self.name, self.unit if self.below is None else self.below, left=not self.form, rank=self.rank)
-
-
 def hidden(*keys: str, form: str = "") -> tuple[Field, ...]:
     """Return columns that stand in JSON and CSV alone."""
     return tuple(Field(key, form, shown=False) for key in keys)
 
 
-def fields(keys: str, form: str, heads: str = "", below: str | None = None, rank: int = 0) -> tuple[Field, ...]:
-    """Return columns of the same form; blanks between keys and heads, a low line within a head."""
-    names: Sequence[str | None] = [each.replace("_", " ") for each in heads.split()] or [None] * len(keys.split())
-    return tuple(Field(key, form, name, below, rank) for key, name in zip(keys.split(), names, strict=True))
-
-
-def _parts(said: Sequence[str | Part]) -> tuple[Part, ...]:
-    return tuple(Words(each) if isinstance(each, str) else each for each in said)
+def constant(**values: Any) -> tuple[Field, ...]:  # noqa: ANN401 (whatever stands in a cell)
+    """Return columns that stand in JSON and CSV alone, with the same value in every row of ``listed``."""
+    return tuple(Field(key, shown=False, of=lambda _, value=value: value) for key, value in values.items())
 
 
 @dataclass(frozen=True)
@@ -151,11 +91,9 @@ class Rows:
         if self.across:
             yield from map(self._turned, self.tables)
             return
-        shown = [(place, each) for place, each in enumerate(self.fields) if each.shown]
-        cells = tuple(tuple(written(row[place], each.form) for place, each in shown) for row in self.rows)
-        table: list[Part] = (
-            [Table(tuple(each.column for _, each in shown), cells, note=self.note)] if cells and shown else []
-        )
+        table: list[Part] = []
+        if len(self.rows) and any(each.shown for each in self.fields):
+            table = [tabulated(self.fields, self.rows, self.note)]
         said = [
             tuple(Words(each) if isinstance(each, str) else each for each in one) for one in (self.above, self.below)
         ]
@@ -243,7 +181,7 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
     """Return sections as a file holds them: ``text`` so wide, ``md``, ``html``, or their document as ``json``."""
     match form:
         case "json":
-            from photostrip.formats.output.result_json import to_json
+            from photostrip.formats.result_json import to_json
 
             return to_json(document)
         case "html":
@@ -254,6 +192,12 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
         case "md":
             return to_markdown(title, sections)
     return to_text(title, sections, width or USUAL)
+
+
+def listed(key: str, title: str, columns: Sequence[Field], objects: Iterable[Any], **more: Any) -> Rows:  # noqa: ANN401 (of rows)
+    """Return a table with a row for each object, in which each column knows what stands in it."""
+    values = [attrgetter(each.of or each.key) if isinstance(each.of, str) else each.of for each in columns]
+    return Rows(key, title, columns, [[value(each) for value in values] for each in objects], **more)
 
 
 def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:

@@ -12,8 +12,9 @@ from photostrip.notes import Document, counted, listed
 from photostrip.planning.ideal_strip import ControlLayout, IdealStrip, Spot, numbers_of
 from photostrip.planning.strip_design import BestPlaces, DesignReport, Outcome, along_the_strip, worst
 from photostrip.report.page.parts import DASH, Words
+from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import rms
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, plain, written
+from photostrip.sheets.sheet import Fact, Rows, Sheet, plain
 
 PHOTOS_SHOWN = 11  # columns of the tables along a strip
 PLACES_SHOWN = 6

@@ -15,9 +15,10 @@ from photostrip.geometry.similarity import Similarity, pair_scales
 from photostrip.notes import counted
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.report.page.parts import Facts, Part, Words
+from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
-from photostrip.sheets.sheet import Cell, Fact, Field, Rows, Sheet, fields, hidden, written
+from photostrip.sheets.sheet import Fact, Rows, Sheet, constant, hidden, listed
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
 from photostrip.strip.pair_screening import stages, tested
@@ -214,30 +215,18 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
         title = f"Relative orientation of {names[1]} – {names[2]}"
         for count, each in enumerate(rounds, 1):
             yield _round(names, each, count, unit, title if count == 1 else "")
-        yield Rows(
+        yield listed(
             "pair_rejected",
             "",
             (
-                *who,
-                Field("point", head="rejected"),
+                *constant(strip=names[0], left=names[1], right=names[2]),
+                Field("point", head="rejected", of=lambda each: ids[orientation.point[each.row]]),
                 Field("test"),
                 *fields("value limit", "ratio g4"),
-                Field("q", "mm 4"),
-                Field("readmitted", head=""),
+                Field("q", "mm 4", of="worst"),
+                Field("readmitted", head="", of=lambda at: Cell("taken back" if at.readmitted else "", at.readmitted)),
             ),
-            [
-                (
-                    *names,
-                    ids[orientation.point[each.row]],
-                    each.test,
-                    each.value,
-                    each.limit,
-                    each.worst,
-                    Cell("taken back" if each.readmitted else "", bool(each.readmitted)),
-                )
-                for each in strip.of_photos.rejections
-                if orientation.pairs.pair[each.row] == number
-            ],
+            [each for each in strip.of_photos.rejections if orientation.pairs.pair[each.row] == number],
         )
         yield from _largest(result, strip, number, names)
         base = (bases[number] * formed.first.base).tolist()
@@ -503,34 +492,19 @@ def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
     corrected = found(xyz)
     given = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate).of(corrected)
     who = hidden("strip")
-    yield Rows(
+    yield listed(
         "polynomial_evidence",
         f"Polynomials of strip {name}, eq. 150-151",
         (
-            *who,
-            *hidden("found"),
+            *constant(strip=name, found=found.degree),
             Field("group"),
             Field("degree", "count"),
-            Field("rms", "m 4"),
-            Field("left_out", "m 4"),
-            Field("F", " g4"),
+            *fields("rms left_out", "m 4"),
+            Field("F", " g4", of="f"),
             Field("p", " g3"),
-            Field("taken", head=""),
+            Field("taken", head="", of=lambda each: Cell("taken" if each.accepted else "", bool(each.accepted))),
         ),
-        [
-            (
-                name,
-                found.degree,
-                each.group,
-                each.degree,
-                each.rms,
-                each.left_out,
-                each.f,
-                each.p,
-                Cell("taken" if each.accepted else "", bool(each.accepted)),
-            )
-            for each in found.evidence
-        ],
+        found.evidence,
     )
     terms = [
         (name, axis, *row, fit.sigma0)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
-from photostrip.formats.text import writing
-from photostrip.report.sections.accuracy_report import SectionName, sections_of
+from photostrip.formats import files
+from photostrip.formats.result_json import read_result
+from photostrip.report.sections.accuracy_report import NAMES, sections_of
 from photostrip.report.sections.overview import MOST_LINES
 from tests.loops import nonempty
 from tests.results import spec, write_project
@@ -211,14 +211,14 @@ def test_a_run_that_fails_leaves_the_earlier_result(
     out = tmp_path / "out"
     assert call("run", project, "-o", out)[0] == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    write = writing._write
+    write = files._write
 
     def full(self: Path, data: str | Iterable[str]) -> None:
         if "result.json" in self.name:
             raise OSError(28, "No space left on device", str(self))
         write(self, data)
 
-    monkeypatch.setattr(writing, "_write", full)
+    monkeypatch.setattr(files, "_write", full)
     code, _, err = call("run", project, "-o", out, "--set", "processing.adjustment=similarity")
     assert code == 2
     assert "No space left on device" in err
@@ -270,9 +270,9 @@ def test_a_section_is_printed_alone(result: Path, call: Call) -> None:
 def test_a_section_that_no_report_has_is_refused_with_the_names(result: Path, call: Call) -> None:
     code, out, err = call("report", result, "--section", "chek")
     assert (code, out) == (2, "")
-    assert "'chek' is not one of 'verdict', 'findings'" in err
+    assert "the report has no section 'chek', but verdict, findings" in err
     names = call("report", "--help")[1].split("NAME: ")[1].split(".")[0]
-    assert " ".join(names.split()) == ", ".join(SectionName)
+    assert " ".join(names.split()) == ", ".join(NAMES)
 
 
 def test_verbose_prints_every_section(result: Path, call: Call) -> None:
@@ -284,9 +284,9 @@ def test_verbose_prints_every_section(result: Path, call: Call) -> None:
 
 
 def test_what_a_killed_run_left_behind_is_removed_by_the_next(project: Path, tmp_path: Path) -> None:
-    dying = "import os; from photostrip.formats.text import writing; from photostrip.cli.main import main\n"
+    dying = "import os; from photostrip.formats import files; from photostrip.cli.main import main\n"
     dying += (
-        f"writing._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
+        f"files._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
     )
     done = subprocess.run([sys.executable, "-c", dying], cwd=tmp_path, capture_output=True, check=False)
     assert done.returncode == -9

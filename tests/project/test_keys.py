@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.formats.measured.control import read_control
-from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings
+from photostrip.cli.main import main
+from photostrip.formats.faults import Findings
+from photostrip.formats.measured import Manner, read_control, read_measurements
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, keys_page, schema_of
 from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances
@@ -19,7 +18,6 @@ from photostrip.project.reading import Node, Place, checked, homes, parse
 from photostrip.project.sections import Section
 from tests.loops import nonempty
 from tests.pages import blocks
-from tests.project.samples import MARKED_FILES, sample
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -196,19 +194,6 @@ def test_the_example_of_a_table_is_right(tmp_path: Path, page: str, rows: int) -
     assert (findings.faults, findings.notes) == ((), [])
 
 
-SHOWN = [
-    ("fiducials.md", "fiducials.csv", "1001,F1", "1001,F7"),
-    ("fiducials.md", "fiducials.csv", "2002,F1,106.1,-106\n2002,F2,-105.9,-106\n", ""),
-]
-
-
-@pytest.mark.parametrize(("page", "file", "old", "new"), SHOWN)
-def test_the_faults_that_a_page_shows_are_those_of_the_program(
-    tmp_path: Path, page: str, file: str, old: str, new: str
-) -> None:
-    project = sample(tmp_path, MARKED_FILES)
-    project.change(file, old, new)
-    (told,) = project.lines()
-    words = re.sub(r"^\S+:\d+(:\d+)?: ", "", told).replace("one of F1, F2", "one of F1, F2, F3, F4")
-    shown = (PAGES / page).read_text(encoding="utf-8")
-    assert words in shown
+def test_the_command_writes_the_page_of_any_kind_of_file(tmp_path: Path) -> None:
+    assert main(["schema", "--plan", "strip", "-o", str(tmp_path / "keys.md")]) == 0
+    assert (tmp_path / "keys.md").read_text(encoding="utf-8") == keys_page("strip")

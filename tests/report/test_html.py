@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import checked, to_json
+from photostrip.formats.result_json import checked, to_json
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words
 from photostrip.report.pictures.result import pictures_of
@@ -69,7 +69,7 @@ def page() -> Page:
 
 def texts(document: Document) -> Iterator[str]:
     """Give everything that the sections say."""
-    for section in sections_of(document, everything=True):
+    for section in sections_of(document):
         yield section.title
         for part in section.parts:
             if isinstance(part, Words):

@@ -130,7 +130,7 @@ def test_the_report_of_an_edited_result_says_so(tmp_path: Path, capsys: pytest.C
         printed = " ".join(capsys.readouterr().out.split())
         assert "LOOK at 1 thing before you use this." in printed
         assert "its numbers are not those of its certificate: it was edited after it was written" in printed
-    document["bundle"]["reliability"]["groups"]["group"][0] = "no such group"
+    document["bundle"]["screening"]["test"] = "no such test"
     file.write_text(json.dumps(document), encoding="utf-8")
     assert main(["report", str(file), "-o", str(tmp_path / "page.html")]) == 2
     assert f"error: {file}: cannot be reported: its numbers are not those" in capsys.readouterr().err

@@ -12,13 +12,11 @@ import pytest
 from scipy import stats
 
 from photostrip.errors import InputError
-from photostrip.formats.output.result_json import checked, to_json
+from photostrip.formats.result_json import checked, to_json
 from photostrip.library.result import Result
-from photostrip.report.page.layout import cells
+from photostrip.report.page.layout import cells, to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
-from photostrip.report.page.text import to_markdown, to_text
 from photostrip.report.sections.accuracy_report import chosen_sections, sections_of, title_of
-from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
 from photostrip.result.table import Table as ResultTable
 from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
@@ -30,8 +28,8 @@ if TYPE_CHECKING:
     from tests.results import Document
 
 
-def printed(document: Document, width: int = 100, *, everything: bool = False) -> str:
-    return to_text(title_of(document), sections_of(document, everything=everything), width)
+def printed(document: Document, width: int = 100) -> str:
+    return to_text(title_of(document), sections_of(document), width)
 
 
 def changed(**keys: object) -> Document:
@@ -166,46 +164,6 @@ def test_warnings_stand_among_the_notes() -> None:
     assert found[-1].parts == (Words("warning: mind this", "look", "-"),)
 
 
-# -------------------------------------------------------------------------------------------------- long projects
-
-
-def long_project(models: int) -> Document:
-    base = saved()["models"][0]
-    rows = [
-        {**base, "left": f"L{n}", "right": f"R{n}", "sigma0_um": float(n % 500), "max_parallax_um": 9.0}
-        for n in range(models)
-    ]
-    return changed(models=rows)
-
-
-def test_a_long_strip_shows_its_worst_pairs_and_counts_the_rest() -> None:
-    text = printed(long_project(1000))
-    assert text.count("L499 – R499") == 2  # once with its parallaxes, once with its elements
-    assert f"worst first; {1000 - WORST_SHOWN} more pairs: --section relative, or `models`" in " ".join(text.split())
-    assert len(text.splitlines()) < 400
-    pairs = tables(section(long_project(1000), "Relative orientation"))[0]
-    sizes = [float(row[3]) for row in pairs.rows]
-    assert sizes == sorted(sizes, reverse=True)
-
-
-def test_a_short_strip_shows_all_pairs_in_flight_order() -> None:
-    pairs = tables(section(long_project(ALL_SHOWN), "Relative orientation"))[0]
-    assert [row[0] for row in pairs.rows] == [f"L{n} – R{n}" for n in range(ALL_SHOWN)]
-
-
-def test_everything_is_everything() -> None:
-    text = printed(long_project(1000), everything=True)
-    assert text.count("– R1 ") == 2
-    assert "more pairs" not in text
-
-
-def test_many_strips_have_one_line_each() -> None:
-    blocks = [{**saved()["polynomials"][0], "strip": f"S{n}"} for n in range(9)]
-    found = section(changed(polynomials=blocks), "Polynomial adjustment")
-    assert [row[0] for row in tables(found)[0].rows] == [f"S{n}" for n in range(9)]
-    assert len(found.parts) == 1
-
-
 # --------------------------------------------------------------------------------------------- numbers and units
 
 
@@ -213,7 +171,7 @@ def test_every_number_of_a_table_has_its_unit() -> None:
     """A column of numbers has a unit, or counts something, or is a ratio, which its name says."""
     without = {
         "points", "rej.", "condition", "scale ratio", "σ0", "redund.", "degree", "terms", "F", "p", "coefficient", "σ",
-        "t", "ratio", "z plan", "z height", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked",
+        "t", "ratio", "z plan", "z height", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked", "list",
     }  # fmt: skip
     for found in nonempty(sections_of(saved())):
         for table in tables(found):
@@ -232,7 +190,7 @@ def test_ranks_keep_the_point_and_its_differences() -> None:
 
 
 def test_rows_of_a_table_have_all_its_columns() -> None:
-    for found in nonempty(sections_of(saved(), everything=True)):
+    for found in nonempty(sections_of(saved())):
         for table in tables(found):
             assert all(len(row) == len(table.columns) for row in (*table.rows, *table.foot)), found.title
 
@@ -309,7 +267,7 @@ def test_points_without_coordinates_are_grouped_by_reason() -> None:
     missing.append({"id": "Q", "reason": "rejected in every pair"})
     text = words(section(changed(not_determined=missing), "Points without coordinates"))
     assert "15 points (measured on one photo): P0, P1" in text
-    assert "P11 and 3 more" in text
+    assert "P13, P14" in text
     assert "1 point (rejected in every pair): Q" in text
 
 

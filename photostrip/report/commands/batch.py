@@ -7,38 +7,26 @@ from dataclasses import replace
 from urllib.parse import quote
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.junit import Case, to_junit
-from photostrip.report.page.numbers import metres
-from photostrip.report.page.parts import DASH, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.messages import Case, to_junit
+from photostrip.report.page.parts import Section, Table, Words
+from photostrip.report.page.tables import Field, fields, metres, tabulated
 
 COLUMNS = (
-    words("project", "project"),
-    words("status", "status"),
-    number("photos", "photos", 0, rank=1),
-    number("points", "points", 0, rank=2),
-    number("rejected", "rejected", 0, rank=2),
-    number("σ0", "sigma0_um", 1, "µm", rank=1),
-    words("at", lambda outcome: outcome["rms_at"] or DASH, rank=1),
-    number("plan", "rms_plan_m", 3, "m"),
-    number("height", "rms_height_m", 3, "m"),
+    Field("project"),
+    Field("status"),
+    Field("photos", "count", rank=1),
+    *fields("points rejected", "count", rank=2),
+    Field("sigma0_um", "µm 1", "σ0", rank=1),
+    Field("rms_at", head="at", rank=1),
+    Field("rms_plan_m", "m 3", "plan"),
+    Field("rms_height_m", "m 3", "height"),
 )
 MOST_ROWS = 60  # projects that are shown; more stand in summary.csv
 MESSAGES = 3  # of one project that are shown
 # How bad each status is, and the style in which it is shown.
 ORDER = (
-    "crashed",
-    "timeout",
-    "memory",
-    "weak",
-    "faulty",
-    "unwritten",
-    "failed",
-    "not run",
-    "look",
-    "unverified",
-    "good",
-)
+    "crashed", "timeout", "memory", "weak", "faulty", "unwritten", "failed", "not run", "look", "unverified", "good"
+)  # fmt: skip
 STYLES = {"good": "good", "unverified": "look", "look": "look", "not run": "look"}
 
 
@@ -52,11 +40,10 @@ def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everyth
 
 def batch_page_sections(outcomes: Sequence[Document]) -> list[Section]:
     """Return the summary as sections of a page: every project with a link to its report, then the worst things."""
-    table = tabulated(outcomes, COLUMNS)
     pages = tuple(f"{quote(each['output'])}/report.html" if each["output"] else "" for each in outcomes)
     found = [
         Section("Verdict", (Words(counts(outcomes), _style(outcomes)),)),
-        Section("Projects", (replace(table, pages=pages),)),
+        Section("Projects", (replace(_table(outcomes, everything=True), pages=pages),)),
     ]
     worst = [each for each in _worst_first(outcomes) if each["messages"]]
     if worst:
@@ -70,14 +57,10 @@ def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
 
 def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
     """Return the table of the projects; of too many, the worst."""
-    shown = list(outcomes) if everything or len(outcomes) <= MOST_ROWS else _worst_first(outcomes)[:MOST_ROWS]
-    missing = len(outcomes) - len(shown)
-    note = (
-        f"{counted(missing, 'more project')} not shown, none of them worse: see --verbose or summary.csv"
-        if missing
-        else ""
-    )
-    return tabulated(shown, COLUMNS, note=note)
+    shown = outcomes if everything or len(outcomes) <= MOST_ROWS else _worst_first(outcomes)[:MOST_ROWS]
+    more = counted(len(outcomes) - len(shown), "more project")
+    note = f"{more} not shown, none of them worse: see --verbose or summary.csv" if len(shown) < len(outcomes) else ""
+    return tabulated(COLUMNS, ([each[column.key] for column in COLUMNS] for each in shown), note)
 
 
 def _messages(wrong: Sequence[Document], *, everything: bool) -> list[Words]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.angles import UNITS, AngleUnit
-from photostrip.report.page.numbers import short
 from photostrip.report.page.parts import DASH, Facts, Section, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import UNITS, AngleUnit, Field, short, tabulated
 
 # What is printed without --verbose: points with a row each in the table of control, kinds of them when there are more,
 # frames that are decoded, tables of which all rows are used.
@@ -33,31 +31,25 @@ def verdict(path: str, faults: int, notes: int) -> str:
 
 
 def _contents(document: Document) -> Section:
-    counts = document["counts"]
+    counts, models = document["counts"], document.get("model_sigma")
     control = "control {control_plan} in plan, {control_height} in height; check {check_plan} in plan, {check_height}"
-    models = document.get("model_sigma")
-    rows = [
+    in_strips = counts["photos"] - counts["in_no_order"]
+    photos = [f"{in_strips} in {counted(counts['strips'], 'strip')}"] if in_strips else []
+    photos += [f"{counts['in_no_order']} in no given order"] if counts["in_no_order"] else []
+    points = f"of {counted(counts['points'], 'point')}, {counts['new']} new"
+    measured = "image points", f"{counts.get('image_points')} {points}"
+    if "models" in counts:
+        centers = counted(counts["model_centers"], "perspective centre")
+        text = f"{counts['model_points']} {points}, in {counted(counts['models'], 'model')}; {centers}"
+        measured = "model points", text
+    rows = (
         ("project", document["name"]),
-        ("photos", _in_strips(counts)),
-        _measured(counts),
+        ("photos", ", ".join(photos)),
+        measured,
         ("given and measured", f"{control.format(**counts)} in height"),
         ("model sigma" if models else "image sigma", _image_sigma(models or document["image_sigma"])),
-    ]
-    return Section("Contents", (Facts(tuple(rows)),))
-
-
-def _in_strips(counts: Document) -> str:
-    in_strips = counts["photos"] - counts["in_no_order"]
-    parts = [f"{in_strips} in {counted(counts['strips'], 'strip')}"] if in_strips else []
-    return ", ".join([*parts, *([f"{counts['in_no_order']} in no given order"] if counts["in_no_order"] else [])])
-
-
-def _measured(counts: Document) -> tuple[str, str]:
-    points = f"of {counted(counts['points'], 'point')}, {counts['new']} new"
-    if "models" not in counts:
-        return "image points", f"{counts['image_points']} {points}"
-    models, centers = counted(counts["models"], "model"), counted(counts["model_centers"], "perspective centre")
-    return "model points", f"{counts['model_points']} {points}, in {models}; {centers}"
+    )
+    return Section("Contents", (Facts(rows),))
 
 
 def _image_sigma(sigma: Document) -> str:
@@ -77,13 +69,12 @@ def _frames(frames: Sequence[Document], unit: AngleUnit, *, everything: bool) ->
     parts: list[Words | Facts] = []
     shown = frames if everything else frames[:FRAMES_SHOWN]
     for frame in shown:
-        name = frame["file"] or "output"
         also = " (also of the results)" if frame["is_output"] and frame["file"] else ""
-        parts.append(Words(f"{name}{also}: {frame['frame']}", "head"))
-        parts.append(Facts(tuple(_decoded(frame, unit))))
+        parts.append(Words(f"{frame['file'] or 'output'}{also}: {frame['frame']}", "head"))
+        parts += [Facts(facts)] if (facts := tuple(_decoded(frame, unit))) else []
     if len(frames) > len(shown):
         parts.append(Words(f"{counted(len(frames) - len(shown), 'more frame')}; --verbose decodes all"))
-    return Section("Ground frames, decoded at one point", tuple(part for part in parts if part != Facts(())))
+    return Section("Ground frames, decoded at one point", tuple(parts))
 
 
 def _decoded(frame: Document, unit: AngleUnit) -> Iterator[tuple[str, str]]:
@@ -99,10 +90,8 @@ def _decoded(frame: Document, unit: AngleUnit) -> Iterator[tuple[str, str]]:
         east, north = "E" if longitude >= 0 else "W", "N" if latitude >= 0 else "S"
         text = f"{abs(latitude):.7f} deg {north}, {abs(longitude):.7f} deg {east}, {height:.3f} m above the ellipsoid"
         yield "  latitude, longitude", text
-        yield (
-            "  geocentric",
-            ", ".join(f"{axis} {value:.3f}" for axis, value in zip("XYZ", frame["cartesian"], strict=True)),
-        )
+        cartesian = zip("XYZ", frame["cartesian"], strict=True)
+        yield "  geocentric", ", ".join(f"{axis} {value:.3f}" for axis, value in cartesian)
     yield "  and back", f"{frame['back_mm']:.6f} mm from the given point"
     if "convergence_deg" in frame:
         low, high = (f"{value * unit.per_degree:+.{4 + unit.more}f}" for value in frame["convergence_deg"])
@@ -117,23 +106,25 @@ def _decoded(frame: Document, unit: AngleUnit) -> Iterator[tuple[str, str]]:
 def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
     """Table of the standard deviation that each control coordinate gets, and where it stands."""
     axes = control[0]["axes"] if control and all(each["axes"] == control[0]["axes"] for each in control) else "xyz"
-    if everything or len(control) <= POINTS_SHOWN:
-        kinds, note = [[each] for each in control], ""
-    else:
+    kinds, note = [[each] for each in control], ""
+    if not everything and len(control) > POINTS_SHOWN:
         kinds, note = _kinds(control)
-
-    def sigma(place: int) -> Callable[[Sequence[Document]], str]:
-        return lambda kind: DASH if kind[0]["sigma"][place] is None else short(kind[0]["sigma"][place])
-
     columns = (
-        words("point", lambda kind: kind[0]["id"] + (", …" if len(kind) > 1 else "")),
-        *([] if len(kinds) == len(control) else [number("points", len)]),
-        words("role", lambda kind: _role(kind[0])),
-        *(number(f"σ {axis}", sigma(n), unit="m") for n, axis in enumerate(axes)),
-        number("photos", _photos),
-        words("from", lambda kind: _sources(kind[0], line=len(kind) == 1)),
+        Field("point"),
+        Field("points", "count", shown=len(kinds) < len(control)),
+        Field("role"),
+        *(Field(f"σ {axis}", "m g4") for axis in axes),
+        Field("photos", "count"),
+        Field("from"),
     )
-    return Section("Standard deviations of the control", (tabulated(kinds, columns, note=note),))
+    rows = []
+    for kind in kinds:
+        first, alone = kind[0], len(kind) == 1
+        low, high = (function(each["photos"] for each in kind) for function in (min, max))
+        photos = low if low == high else f"{low} to {high}"
+        name = first["id"] + ("" if alone else ", …")
+        rows.append((name, len(kind), _role(first), *first["sigma"], photos, _sources(first, line=alone)))
+    return Section("Standard deviations of the control", (tabulated(columns, rows, note),))
 
 
 def _kinds(control: Sequence[Document]) -> tuple[list[list[Document]], str]:
@@ -148,11 +139,6 @@ def _kinds(control: Sequence[Document]) -> tuple[list[list[Document]], str]:
 
 def _role(each: Document) -> str:
     return str(each["role"]) if any(each["counts"]) else "off"
-
-
-def _photos(kind: Sequence[Document]) -> str:
-    low, high = (function(each["photos"] for each in kind) for function in (min, max))
-    return str(low) if low == high else f"{low} to {high}"
 
 
 def _sources(each: Document, *, line: bool) -> str:

@@ -1,12 +1,18 @@
-"""How a report stands on a page of a given width: lines of words with a style each, the same for paper and terminal."""
+"""How a report stands on a page of a given width: lines of words with a style each; as Markdown, and on a terminal.
+
+Without colours (a pipe, a file, ``NO_COLOR``, a dumb terminal) the lines go out as they are, and rich is not even
+imported: what tests and other programs see does not depend on it.
+"""
 
 from __future__ import annotations
 
+import os
+import shutil
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.visible import visible
@@ -22,6 +28,17 @@ ASCII = {
     "µ": "u", "σ": "sigma", "α": "alpha", "ω": "omega", "κ": "kappa", "τ": "tau", "ν": "nu", "±": "+-", "×": "x",
     "–": "-", "—": "-", "…": "...", "─": "-", "²": "2", "°": "deg", "·": "*",
 }  # fmt: skip
+BEFORE = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_[]<>|#"})
+STYLES = {
+    "title": "bold cyan",
+    "head": "bold",
+    "foot": "bold",
+    "note": "dim",
+    "good": "bold green",
+    "look": "bold yellow",
+    "unverified": "bold yellow",
+    "failed": "bold red",
+}
 
 
 class Line(NamedTuple):
@@ -33,10 +50,7 @@ class Line(NamedTuple):
 
 def plain_ascii(text: str) -> str:
     """Write the report's own signs with ASCII letters; ids keep theirs."""
-    return text.translate(_ASCII)
-
-
-_ASCII = str.maketrans(ASCII)
+    return text.translate(str.maketrans(ASCII))
 
 
 def clamp(width: int) -> int:
@@ -200,3 +214,86 @@ def pad(text: str, width: int, *, left: bool) -> str:
     """Fill a cell of a table with blanks."""
     blanks = " " * (width - cells(text))
     return text + blanks if left else blanks + text
+
+
+def to_text(title: str, sections: Iterable[Section], width: int = USUAL, *, ascii_only: bool = False) -> str:
+    lines = lay_out(title, sections, width, ascii_only=ascii_only)
+    return "".join(f"{line.text}\n" for line in lines)
+
+
+def to_markdown(title: str, sections: Iterable[Section], *, ascii_only: bool = False) -> str:
+    """Return a report as Markdown, all columns of all tables shown."""
+    blocks = [f"# {_safe(title)}"] if title else []
+    for section in sections:
+        blocks += [f"## {_safe(section.title)}"] if section.title else []
+        blocks += ["\n".join(_markdown(part)) for part in section.parts]
+    page = "\n\n".join(blocks) + "\n"
+    return plain_ascii(page) if ascii_only else page
+
+
+def _safe(text: str) -> str:
+    """Keep signs of Markdown in ids and sentences from being read as such."""
+    return visible(text).translate(BEFORE)
+
+
+def _markdown(part: Part) -> Iterator[str]:
+    if isinstance(part, Words):
+        text = f"**{_safe(part.text)}**" if part.style else _safe(part.text)
+        yield f"{part.mark} {text}" if part.mark else text
+    elif isinstance(part, Facts):
+        yield from (f"- {_safe(label)}: {_safe(value)}" for label, value in part.rows)
+    else:
+        yield from _markdown_table(part)
+
+
+def _markdown_table(table: Table) -> Iterator[str]:
+    heads = [f"{column.name}, {column.unit}" if column.unit else column.name for column in table.columns]
+    yield _markdown_row(heads)
+    yield "|" + "|".join(":--" if column.left else "--:" for column in table.columns) + "|"
+    yield from map(_markdown_row, (*table.rows, *table.foot))
+    if table.note:
+        yield f"\n{_safe(table.note)}"
+
+
+def _markdown_row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(map(_safe, cells))} |"
+
+
+def print_report(
+    title: str, sections: Iterable[Section], stream: TextIO, width: int | None = None, *, colour: bool | None = None
+) -> None:
+    """Print a report as wide as the terminal, 100 where there is none; in colours where the stream has them."""
+    lines = lay_out(
+        title, sections, page_width() if width is None else clamp(width), ascii_only=not speaks_unicode(stream)
+    )
+    if has_colours(stream, os.environ) if colour is None else colour:
+        _print_coloured(lines, stream)
+    else:
+        stream.write("".join(f"{line.text}\n" for line in lines))
+
+
+def page_width() -> int:
+    """Width of the terminal (or of ``COLUMNS``), brought between 60 and 200; 100 where there is none."""
+    return clamp(shutil.get_terminal_size((USUAL, 24)).columns)
+
+
+def speaks_unicode(stream: TextIO) -> bool:
+    """Whether a stream can show more than ASCII."""
+    encoding = (getattr(stream, "encoding", None) or "utf-8").lower().replace("-", "").replace("_", "")
+    return encoding in {"utf8", "utf8sig", "cp65001"} or encoding.startswith(("utf16", "utf32"))
+
+
+def has_colours(stream: TextIO, environment: Mapping[str, str]) -> bool:
+    """Whether to use colours on a stream: ``NO_COLOR``, when it is not empty, and ``TERM=dumb`` forbid them."""
+    if environment.get("NO_COLOR") or environment.get("TERM", "") in {"dumb", "unknown"}:
+        return False
+    return stream.isatty()
+
+
+def _print_coloured(lines: Iterable[Line], stream: TextIO) -> None:
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(file=stream, force_terminal=True, highlight=False, markup=False, soft_wrap=True)
+    for line in lines:
+        console.print(Text(line.text, style=STYLES.get(line.style, "")))

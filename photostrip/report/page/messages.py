@@ -1,4 +1,4 @@
-"""Faults, findings and notes in the three forms in which they are reported: lines, JSON for programs, annotations.
+"""Faults, findings and notes as they are reported: lines, JSON for programs, annotations, test cases.
 
 Whatever the form, the same findings come out with the same file, line, column, key and code.
 """
@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+from xml.sax.saxutils import escape, quoteattr
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.notes import Document, Finding, Note
@@ -20,6 +22,7 @@ EMPTY: Document = {
     "file": "", "line": 0, "column": 0, "key": "", "expected": "", "fix": "", "photos": [], "points": []
 }  # fmt: skip
 MOST_OF_A_KIND = 5  # faults, findings, or notes, of one kind that are told to people
+FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")  # what XML 1.0 cannot hold
 NUMBER = re.compile(r"\d+")  # in the path of a key: which of a list it is
 
 
@@ -154,3 +157,45 @@ def _escaped(text: str, more: str = "") -> str:
     for sign in f"%\r\n{more}":
         text = text.replace(sign, f"%{ord(sign):02X}")
     return text
+
+
+class Case(NamedTuple):
+    name: str
+    failure: str = ""  # why it failed, in one line; empty when it passed
+    details: str = ""
+    skipped: str = ""  # why it was not tested; empty when it was
+    error: str = ""  # why it could not be tested, in one line; empty when it could
+
+
+def to_junit(suite: str, cases: Iterable[Case]) -> str:
+    """Return a suite of test cases as JUnit XML, without times."""
+    listed = list(cases)
+    failed, errors, skipped = (
+        sum(bool(getattr(each, key)) for each in listed) for key in ("failure", "error", "skipped")
+    )
+    counts = f'tests="{len(listed)}" failures="{failed}" errors="{errors}" skipped="{skipped}"'
+    body = "".join(_case(suite, case) for case in listed)
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        f"<testsuites {counts}>\n"
+        f"  <testsuite name={_quoted(suite)} {counts}>\n{body}  </testsuite>\n</testsuites>\n"
+    )
+
+
+def _case(suite: str, case: Case) -> str:
+    head = f"    <testcase classname={_quoted(suite)} name={_quoted(case.name)}"
+    kind, message = ("error", case.error) if case.error else ("failure", case.failure)
+    if message:
+        details = escape(_clean(case.details or message))
+        return f"{head}>\n      <{kind} message={_quoted(message)}>{details}</{kind}>\n    </testcase>\n"
+    if case.skipped:
+        return f"{head}>\n      <skipped message={_quoted(case.skipped)}/>\n    </testcase>\n"
+    return f"{head}/>\n"
+
+
+def _quoted(text: str) -> str:
+    return quoteattr(_clean(text))
+
+
+def _clean(text: str) -> str:
+    return FORBIDDEN.sub("?", visible(text))

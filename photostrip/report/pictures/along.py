@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.numbers import short
+from photostrip.report.page.tables import short
 from photostrip.report.pictures.chart import Floats, Layer, Line, Marks, Panel, Segments, chart, span
 from photostrip.report.pictures.places import Course, Plan, numbers
 from photostrip.report.pictures.plan import ROLES

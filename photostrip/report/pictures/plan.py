@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.numbers import short
+from photostrip.report.page.tables import short
 from photostrip.report.pictures.chart import (
     Areas,
     Bar,

@@ -1,22 +1,35 @@
-"""What was asked for and corrected, and how much there is of everything."""
+"""What was asked for and corrected, what was decided without being asked for, and how much there is of everything."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
-from math import hypot
+from collections.abc import Iterator, Sequence
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.angles import AngleUnit, angle_unit
-from photostrip.report.page.numbers import fixed, joined, metres, micrometres, short
-from photostrip.report.page.parts import Facts, Section
-from photostrip.report.page.tables import Shown, angle, number, tabulated, words
-from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
-from photostrip.report.sections.strip import worst_first
+from photostrip.report.page.parts import DASH, Facts, Part, Words
+from photostrip.report.page.tables import (
+    LEAST_PROBABILITY,
+    angle_unit,
+    fixed,
+    keyed,
+    metres,
+    micrometres,
+    short,
+)
+
+NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
 
 
-def project_section(document: Document) -> Section:
-    meaning = document["conventions"]
+def of_models(document: Document) -> bool:
+    return "links" in document
+
+
+def scale_word(document: Document) -> str:
+    """Return the scale to which differences on the ground are brought: that of the photos or of the models."""
+    return "model" if of_models(document) else "photo"
+
+
+def project(document: Document) -> Iterator[Part]:
+    meaning, settings = document["conventions"], document["settings"]
     scale, models = scale_word(document), of_models(document)
     rows = [
         ("adjustment", adjustment_of(document)),
@@ -25,85 +38,23 @@ def project_section(document: Document) -> Section:
         (f"at {scale} scale", f"metres divided by the denominator of the {scale} scale, in micrometres (µm)"),
         ("rotations", f"{meaning['angle_1 to angle_3']}; {meaning['r11 to r33']}"),
         *((f"camera {camera['id']}", camera_line(camera)) for camera in document["cameras"]),
-        *_corrections(document["corrections"])[1 if models else 0 :],
-        *(project_rows(document) if models else _of_photos(document["settings"])),
+        *_corrections(document["corrections"], models=models),
+        ("screening", _of_links(settings["links"]) if models else _of_pairs(settings["relative"])),
     ]
-    return Section("Project", (Facts(tuple(rows)),))
-
-
-def _of_photos(settings: Document) -> list[tuple[str, str]]:
-    transfer = settings["formation"]["scale_transfer"].replace("_", " ")
-    return [("screening", _screening(settings["relative"])), ("scale transfer", transfer)]
-
-
-def fiducials_section(document: Document, *, everything: bool) -> Section:
-    """Interior orientation: the transformation of each photo, and what is left at its marks."""
-    rows, unit = document["fiducials"], angle_unit(document)
-    marks = list(document["fiducial_marks"])
-    largest: dict[str, float] = {}
-    for mark in marks:
-        largest[mark["photo"]] = max(largest.get(mark["photo"], 0.0), _length(mark))
-
-    def worst(row: Document) -> float:
-        return largest.get(row["photo"], 0.0)
-
-    photos, note = worst_first(rows, worst, ("photos", "fiducials", "fiducials"), everything=everything)
-    shown, rest = worst_first(marks, _length, ("marks", "fiducials", "fiducial_marks"), everything=everything)
-    shapes = (
-        words("photo", "photo"),
-        words("transformation", "transform"),
-        number("marks", "marks"),
-        number("σ0", "sigma0_um", 1, "µm"),
-        number("largest", worst, 1, "µm"),
-        number("scale x", "scale_x", 6),
-        number("scale y", "scale_y", 6),
-        angle("turn", "rotation_deg", 4, unit, rank=1),
-        angle("shear", "shear_deg", 4, unit, rank=1),
-        words("", lambda row: "mirrored" if row["mirrored"] else "", rank=2),
-    )
-    coefficients = (
-        words("photo", lambda pair: pair[0]["photo"]),
-        words("of", lambda pair: COORDINATES[pair[1]]),
-        *(number(term, _coefficient(n), partial(short, digits=10)) for n, term in enumerate(("x", "y", "xy", "1"))),
-    )
-    denominator = any(row["transform"] == "projective" for row in rows)
-    lines = [(row, axis) for row in photos for axis in range(3 if denominator else 2)]
-    residuals = (
-        words("photo", "photo"),
-        words("mark", "mark"),
-        number("v x", "vx_um", 1, "µm"),
-        number("v y", "vy_um", 1, "µm"),
-    )
-    tables = (
-        tabulated(photos, shapes, note=joined(note, "scale: photo over measured; turn, shear: counter-clockwise")),
-        tabulated(lines, coefficients, note="photo coordinates, mm, from the measured ones"),
-        tabulated(shown, residuals, note=joined(rest, "transformed minus calibrated")),
-    )
-    return Section("Interior orientation", tables)
-
-
-COORDINATES = ("x", "y", "divided by")
-
-
-def _coefficient(term: int) -> Callable[[tuple[Document, int]], float]:
-    return lambda pair: float(pair[0]["coefficients"][pair[1]][term])
-
-
-def _length(mark: Document) -> float:
-    return hypot(mark["vx_um"], mark["vy_um"])
+    if models:
+        rows.append(("links", "a similarity in space from model to model"))
+    else:
+        rows.append(("scale transfer", settings["formation"]["scale_transfer"].replace("_", " ")))
+    yield Facts(tuple(rows))
 
 
 def adjustment_of(document: Document) -> str:
     """Say how the points were adjusted, and who wanted it."""
-    text = _adjustment_of(document)
+    text = str(document["adjustment"])
+    if text == "polynomial":
+        asked = document["settings"]["polynomial"]["degree"]
+        text = f"polynomial, degree {'by evidence' if asked == 'auto' else f'{asked} asked for'}"
     return f"{text}; chosen by `auto`" if document["settings"]["adjustment"] == "auto" else text
-
-
-def _adjustment_of(document: Document) -> str:
-    if document["adjustment"] != "polynomial":
-        return str(document["adjustment"])
-    asked = document["settings"]["polynomial"]["degree"]
-    return f"polynomial, degree {'by evidence' if asked == 'auto' else f'{asked} asked for'}"
 
 
 def cameras_of(document: Document) -> dict[str, Document]:
@@ -112,7 +63,8 @@ def cameras_of(document: Document) -> dict[str, Document]:
     of_strip = {strip["id"]: cameras[strip["camera"]] for strip in document["strips"] if strip["camera"] in cameras}
     single = {photo: camera for camera in cameras.values() for photo in camera["single_photos"]}
     only = next(iter(cameras.values())) if len(cameras) == 1 else None
-    found = {photo["id"]: single.get(photo["id"]) or of_strip.get(photo["strip"], only) for photo in document["photos"]}
+    photos = zip(*(document["photos"].values(key) for key in ("id", "strip")), strict=True)
+    found = {photo: single.get(photo) or of_strip.get(strip, only) for photo, strip in photos}
     return {photo: camera for photo, camera in found.items() if camera is not None}
 
 
@@ -126,21 +78,21 @@ def camera_line(camera: Document) -> str:
     return f"{text}, {'distortion ' + camera['distortion'] if camera['distortion'] else 'no distortion'}"
 
 
-def _corrections(corrections: Document) -> list[tuple[str, str]]:
-    effects = (("principal_point", "principal point"), ("distortion", "lens distortion"), ("refraction", "refraction"))
-    image = [
-        f"{name} up to {micrometres(corrections[key]['largest_um'])} µm"
-        if corrections[key]["applied"]
-        else f"{name} none"
-        for key, name in effects
-    ]
-    curvature = corrections["earth_curvature"]
+def _corrections(corrections: Document, *, models: bool) -> Iterator[tuple[str, str]]:
+    curvature, interior = corrections["earth_curvature"], corrections["interior"]
+    if interior:
+        yield "fiducial marks", interior_line(interior)
+    if not models:
+        image = (
+            f"{key.replace('distortion', 'lens distortion').replace('_', ' ')} "
+            + (f"up to {micrometres(corrections[key]['largest_um'])} µm" if corrections[key]["applied"] else "none")
+            for key in ("principal_point", "distortion", "refraction")
+        )
+        yield "image corrections", ", ".join(image)
     size = f", up to {metres(curvature['largest'])} m in height" if curvature["largest"] else ""
     if "largest_um" in curvature:
         size = f", up to {micrometres(curvature['largest_um'])} µm"
-    interior = corrections["interior"]
-    rows = [("image corrections", ", ".join(image)), ("Earth curvature", f"{curvature['treatment']}{size}")]
-    return [*([("fiducial marks", interior_line(interior))] if interior else []), *rows]
+    yield "Earth curvature", f"{curvature['treatment']}{size}"
 
 
 def interior_line(interior: Document) -> str:
@@ -151,12 +103,10 @@ def interior_line(interior: Document) -> str:
             f"; residuals rms {micrometres(interior['rms_um'])} µm, largest {micrometres(interior['largest_um'])} µm, "
             f"at mark {interior['largest_mark']} of photo {interior['largest_photo']}"
         )
-    if interior.get("interpolated"):
-        text += "; the residuals are interpolated to the points"
-    return text
+    return text + "; the residuals are interpolated to the points" * bool(interior.get("interpolated"))
 
 
-def _screening(settings: Document) -> str:
+def _of_pairs(settings: Document) -> str:
     method, limit = settings["screening"], settings["parallax_limit"]
     if method not in {"parallax+grubbs", "tau"}:
         return str(method)
@@ -166,36 +116,48 @@ def _screening(settings: Document) -> str:
     return text
 
 
-def counts_section(document: Document) -> Section:
-    facts = Facts(tuple(counts_rows(document)))
-    strips = document["strips"]
-    return Section("Counts", (facts, tabulated(strips, _strips(angle_unit(document)))) if len(strips) > 1 else (facts,))
+def _of_links(settings: Document) -> str:
+    text = str(settings["screening"])
+    if text == "auto":
+        text = f"each common point as a whole, level {settings['alpha']:g} for the strip"
+    named = [f"{name} {', '.join(settings[name])}" for name in ("keep", "drop") if settings[name]]
+    return "; ".join([text, *named])
+
+
+def counts(document: Document) -> Iterator[Part]:
+    yield Facts(tuple(counts_rows(document)))
+    if len(document["strips"]) > 1:
+        scale = "model_scale" if of_models(document) else "photo_scale"
+        keys = f"id photos points {scale} flying_height base azimuth_deg sigma0_um image_rms_um:1"
+        yield keyed(document["strips"], keys)
 
 
 def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
     """Count photos, points and measurements; scale, height and base."""
-    counts, strips = document["counts"], document["strips"]
+    counts, strips, summary, unit = document["counts"], document["strips"], document["summary"], angle_unit(document)
     flown = counted(counts["strips"], "strip") if counts["strips"] else "no strip"
     yield "photos", f"{counts['photos']} in {flown}, {counted(counts['models'], 'model')}"
-    by_role = (
-        f"{counts['points']}: {counts['new_points']} new, {counts['control_points']} control "
-        f"({counts['control_plan']} in plan, {counts['control_height']} in height), {counts['check_points']} check"
-    )
-    yield "points", by_role
+    text = "{points}: {new_points} new, {control_points} control ({control_plan} in plan, {control_height} in height), "
+    yield "points", f"{text}{{check_points}} check".format(**counts)
     if of_models(document):
-        yield from measured(document)
+        text = "{model_points} of points, {model_points_used} used; {model_centers} of perspective centres"
+        yield "model coordinates", text.format(**counts)
+        yield "rejected", f"{counts['rejected_in_links']} in links" if counts["rejected_in_links"] else DASH
     else:
-        yield "image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"
+        yield "image points", "{image_points} measured, {image_points_used} used".format(**counts)
         yield "rejected", _rejections(counts)
     yield "without coordinates", counted(counts["not_determined"], "point")
     if len(strips) == 1:
-        yield f"{scale_word(document)} scale", _scale(strips[0], angle_unit(document))
-    elif not strips:  # single photos, which form none
-        summary = document["summary"]
+        (strip,) = strips
+        text = (
+            f"1:{strip['photo_scale'] or strip['model_scale']:.0f}, flying height {fixed(strip['flying_height'], 0)} m "
+            f"above ground, base {fixed(strip['base'], 0)} m, azimuth {unit.text(strip['azimuth_deg'], 1)} {unit.name}"
+        )
+        yield f"{scale_word(document)} scale", text
+    elif not len(strips):  # single photos, which form none
         scale = f"1:{summary['photo_scale']:.0f}, flying height {fixed(summary['flying_height'], 0)} m above ground"
         yield "photo scale", scale
-    size = document["summary"].get("gsd")
-    if size:
+    if size := summary.get("gsd"):
         text = f"{short(size['median'], 3)} m, {short(size['least'], 3)} to {short(size['largest'], 3)} m"
         yield "ground sample", f"{text}: what a pixel covers, median and range of the photos"
 
@@ -208,22 +170,65 @@ def _rejections(counts: Document) -> str:
     return f"{text}, {counted(points, 'point')} with rays that contradict each other" if points else text
 
 
-def _scale(strip: Document, unit: AngleUnit) -> str:
-    return (
-        f"1:{strip['photo_scale'] or strip['model_scale']:.0f}, flying height {fixed(strip['flying_height'], 0)} m "
-        f"above ground, base {fixed(strip['base'], 0)} m, azimuth {unit.text(strip['azimuth_deg'], 1)} {unit.name}"
-    )
+def decisions(document: Document) -> Iterator[Part]:
+    """Say what `auto` came to, and why."""
+    rows = tuple(_decisions(document))
+    yield Facts(rows) if rows else Words("Nothing: every choice is made in the project file.")
 
 
-def _strips(unit: AngleUnit) -> tuple[Shown, ...]:
-    return (
-        words("strip", "id"),
-        number("photos", "photos"),
-        number("points", "points"),
-        number("scale 1:", lambda strip: f"{strip['photo_scale'] or strip['model_scale']:.0f}"),
-        number("height", "flying_height", 0, "m"),
-        number("base", "base", 0, "m"),
-        angle("azimuth", "azimuth_deg", 1, unit),
-        number("σ0", "sigma0_um", 1, "µm"),
-        number("image rms", "image_rms_um", 1, "µm", rank=1),
-    )
+def _decisions(document: Document) -> Iterator[tuple[str, str]]:
+    settings, counts = document["settings"], document["counts"]
+    if settings["adjustment"] == "auto":
+        bundle = f"bundle, which all {'models' if of_models(document) else 'photos'} together determine"
+        why_not = "polynomial: no bundle could be had, the notes say why"
+        yield "adjustment", bundle if "bundle" in document else why_not
+    for block in document.get("polynomials", []):
+        if block["asked"] == "auto":
+            text = chosen_degrees(document["polynomial_evidence"].where(strip=block["strip"]))
+            how = "F is the ratio of the gain over the degree before, p its probability by chance"
+            label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
+            yield label, text if text == NO_DEGREE else f"{text}; {how}"
+    if "relative" in settings:
+        if settings["relative"]["screening"] == "auto":
+            text = "robust start, then a global test of each pair, points left out singly and in sets"
+            yield "screening", f"{text}; {counted(counts['rejected_in_pairs'], 'point')} left out"
+        elif settings["relative"]["screening"] == "parallax+grubbs" and settings["relative"]["parallax_limit"] is None:
+            sigma = f"{micrometres(document['summary']['sigma_given_um'])} µm stated for an image coordinate"
+            yield "limit of y parallax", f"four times its standard deviation, which follows from the {sigma}"
+    elif settings["links"]["screening"] == "auto":
+        text = "every common point of each link tested as a whole, the worst left out first"
+        yield "screening", f"{text}; {counted(counts['rejected_in_links'], 'point')} left out"
+    interior = document["corrections"]["interior"]
+    if interior and settings["interior"]["transform"] == "auto":
+        text = "transformation: affine where four or more marks determine it, otherwise conformal"
+        yield "fiducial marks", f"{' and '.join(interior['transforms'])} {text}"
+    curvature = document["corrections"]["earth_curvature"]
+    if curvature["asked"] == "auto":
+        yield "Earth curvature", f"{curvature['treatment']}, as the frame of the control requires"
+    yield from _heights(document, settings.get("refinement", {}))
+
+
+def chosen_degrees(evidence: Sequence[Document]) -> str:
+    """Say of which degree a polynomial is, in plan and in height, and what spoke for it."""
+    chosen = {row["group"]: _step(row) for row in evidence if row["accepted"] and row["degree"]}
+    if not chosen:
+        return NO_DEGREE
+    plan, height = (chosen.get(group, "none") for group in ("plan", "height"))
+    return f"{plan} in plan and in height" if plan == height else f"{plan} in plan and {height} in height"
+
+
+def _step(row: Document) -> str:
+    if row["f"] is None or row["p"] is None:
+        return f"degree {row['degree']}"
+    probability = f"p = {row['p']:.3f}" if row["p"] >= LEAST_PROBABILITY else f"p below {LEAST_PROBABILITY:g}"
+    return f"degree {row['degree']} (F = {row['f']:.1f}, {probability})"
+
+
+def _heights(document: Document, settings: Document) -> Iterator[tuple[str, str]]:
+    asked = [name for name, key in (("refraction", "refraction"), ("curvature", "earth_radius")) if settings.get(key)]
+    if asked and (settings["flying_height"] is None or settings["ground_height"] is None):
+        known = list(document["strips"]) or [document["summary"]]
+        heights = ", ".join(f"{short(each['flying_height'])} m" for each in known)
+        without = "it" if len(asked) == 1 else "them"
+        label = f"heights for {' and '.join(asked)}"
+        yield label, f"from a first run without {without}; flying height above ground {heights}"

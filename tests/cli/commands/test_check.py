@@ -12,8 +12,8 @@ import pytest
 
 from photostrip.project.check import check_project
 from photostrip.report.commands.check import check_sections
+from photostrip.report.page.layout import to_text
 from photostrip.report.page.parts import Table
-from photostrip.report.page.text import to_text
 from photostrip.result.table import rows_of
 from tests.loops import nonempty
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample

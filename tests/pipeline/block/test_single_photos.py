@@ -50,10 +50,9 @@ def test_every_output_knows_single_photos() -> None:
     simulation = simulate(replace(Spec(), flight=Flight(photos=6), control=replace(MANY, noise=(0.05, 0.05, 0.08))))
     result = adjusted(simulation, singles(simulation))
     document = document_of(result)
-    for everything in (False, True):
-        titles = [section.title for section in sections_of(document, everything=everything)]
-        assert "Bundle adjustment" in titles
-        assert "Relative orientation" not in titles
+    titles = [section.title for section in sections_of(document)]
+    assert "Bundle adjustment" in titles
+    assert "Relative orientation" not in titles
     assert to_html(document).count("<svg") >= 2
     assert set(result_files(document)) > {"points.csv", "photos.csv", "residuals.csv"}
     assert "absolute" not in trace_sheet(result).document()
@@ -102,4 +101,4 @@ def test_a_strip_with_a_pair_that_cannot_be_oriented_starts_from_given_orientati
     verdict = verdict_of(document)
     assert verdict["status"] == "look"
     assert any("start from their given orientations" in text for text in verdict["look_at"])
-    assert [section.title for section in sections_of(document, everything=True)]
+    assert [section.title for section in sections_of(document)]

@@ -10,8 +10,7 @@ import sys
 
 import pytest
 
-from photostrip.report.page.console import has_colours, page_width, print_report, speaks_unicode
-from photostrip.report.page.text import to_text
+from photostrip.report.page.layout import has_colours, page_width, print_report, speaks_unicode, to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from tests.reports import saved
 from tests.source_tree import ROOT
@@ -85,7 +84,7 @@ def test_the_width_is_that_of_the_terminal(columns: str, width: int, monkeypatch
 @pytest.mark.slow
 def test_rich_is_not_loaded_for_a_pipe() -> None:
     code = (
-        "import sys\nfrom tests.reports import *\nfrom photostrip.report.page.console import print_report\n"
+        "import sys\nfrom tests.reports import *\nfrom photostrip.report.page.layout import print_report\n"
         "print_report('', sections_of(saved()), sys.stdout)\n"
         "sys.exit('rich' in sys.modules)"
     )

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import copy
-
 from photostrip.errors import Fault
 from photostrip.notes import Note
 from photostrip.plausibility import found
 from photostrip.report.page.messages import MOST_OF_A_KIND, finding_of, lines_of
-from photostrip.report.page.parts import Words
-from photostrip.report.sections.findings import cures_section, findings_sections
-from tests.reports import saved
 
 SHARED = [found("P301", f"point {number} stands for two points", "", points=(f"{number}",)) for number in range(4427)]
 OUTSIDE = found("P402", "control[0] lies elsewhere", "correct the crs")
@@ -45,14 +40,3 @@ def test_faults_are_told_by_column_and_by_the_key_of_a_list() -> None:
     assert len(told(*(Fault("2 points", "few", "p.yaml", key=f"strips[0].photos[{i}]") for i in range(40)))) == 6
     keys = [Fault("no key", "unknown-key", "p.yaml", key=key) for key in ("a", "b", "c", "d", "e", "f", "g")]
     assert len(told(*keys)) == len(keys)
-
-
-def test_reports_show_every_kind() -> None:
-    document = copy.deepcopy(saved())
-    document["findings"] = [finding_of(each) for each in (*SHARED, OUTSIDE)]
-    (section,) = findings_sections(document, everything=False)
-    for parts in (section.parts, cures_section(document, 12).parts):
-        texts = [part.text for part in parts if isinstance(part, Words)]
-        assert sum(text.startswith("P301 one id for two points (") for text in texts) == MOST_OF_A_KIND
-        assert sum(text.startswith("P402") for text in texts) == 1
-        assert any("4422 more" in text for text in texts)

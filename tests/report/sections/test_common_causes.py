@@ -13,7 +13,7 @@ from photostrip.geometry.rotation import angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.run import triangulate
 from photostrip.report.html import to_html
-from photostrip.report.page.text import to_markdown
+from photostrip.report.page.layout import to_markdown
 from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Spec

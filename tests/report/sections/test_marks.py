@@ -10,9 +10,9 @@ import pytest
 
 import photostrip
 from photostrip.report.html import to_html
+from photostrip.report.page.layout import to_text
 from photostrip.report.page.parts import Facts, Table
-from photostrip.report.page.text import to_text
-from photostrip.report.sections.accuracy_report import SectionName, chosen_sections
+from photostrip.report.sections.accuracy_report import chosen_sections
 from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
 from tests.reports import saved
@@ -43,7 +43,7 @@ def printed(document: Document) -> str:
 
 
 def test_the_marks_of_given_points_are_shown_in_pixels(block: Document) -> None:
-    (section,) = chosen_sections(block, names=[SectionName.MARKS])
+    (section,) = chosen_sections(block, names=["marks"])
     _, facts, table = section.parts
     assert isinstance(table, Table)
     shown = {(row[0], row[2]): row for row in table.rows}
@@ -72,7 +72,7 @@ def test_a_mark_beside_its_point_stands_first_in_the_short_report(block: Documen
 
 
 def test_marks_of_film_are_shown_in_micrometres() -> None:
-    (section,) = chosen_sections(saved(), names=[SectionName.MARKS])
+    (section,) = chosen_sections(saved(), names=["marks"])
     (table,) = (part for part in section.parts if isinstance(part, Table))
     assert table.rows
     assert [column.unit for column in table.columns if column.name.startswith("v ")] == ["µm", "µm"]
@@ -105,6 +105,6 @@ def test_the_estimated_camera_has_pixels_significance_and_correlations(block: Do
     (first, second), value = max(pairs.items(), key=lambda pair: abs(pair[1]))
     assert f"largest correlation {value:+.2f}, {first} with {second}".replace("_", " ") in said
     assert "highly correlated" in said
-    section = to_text("", chosen_sections(block, names=[SectionName.BUNDLE]), 100)
+    section = to_text("", chosen_sections(block, names=["bundle"]), 100)
     (line,) = (line for line in section.splitlines() if line.startswith("4 k1"))
     assert line.split()[2:] == [f"{each:+.2f}" for each in k1["correlations"][:3]]
