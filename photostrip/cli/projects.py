@@ -217,8 +217,10 @@ def run(
             write_rule(depfile, output / RESULT, files_read)  # before the result: it must not be the newer of the two
             messages.say(f"wrote {len(result.write(output, html=html))} files to {output}")
         if plots is not None:
-            pictures = result.pictures()
-            write_files(plots, {f"{name}.svg": picture.file() for name, picture in pictures.items()})
+            from photostrip.report.pictures.result import picture_files
+
+            pictures = picture_files(result.document)
+            write_files(plots, pictures)
             messages.say(f"wrote {len(pictures)} pictures to {plots}")
     print_result(result.document, form, width, quiet=quiet, everything=verbose, names=section or ())
     return exit_code(result.status, strict=strict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from os import PathLike
@@ -88,6 +88,28 @@ def _table(name: str, meaning: str) -> cached_property[Table]:
 
     of.__doc__ = meaning
     return cached_property(of)
+
+
+class Plots:
+    """The pictures that a result holds numbers for, each by a method of its name; a notebook shows what it returns."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+
+    def __getattr__(self, name: str) -> Callable[[], Picture]:
+        """Return what draws a picture; its ``file()`` is SVG."""
+        found = {} if name.startswith("_") else self._by_name()
+        if name not in found:
+            raise AttributeError(f"this result has no picture {name!r}: {', '.join(found)}")
+        return lambda: found[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._by_name()]
+
+    def _by_name(self) -> dict[str, Picture]:
+        from photostrip.report.pictures.result import pictures_of
+
+        return {picture.name.replace("-", "_"): picture for picture in pictures_of(self._document)}
 
 
 class Result:
@@ -265,11 +287,10 @@ class Result:
 
         return exported(self.document, self._exports).files
 
-    def pictures(self) -> dict[str, Picture]:
-        """Return the pictures of the report by name: a notebook shows them, ``file()`` is the SVG of one."""
-        from photostrip.report.pictures.result import pictures_of
-
-        return {picture.name: picture for picture in pictures_of(self.document)}
+    @property
+    def plot(self) -> Plots:
+        """The pictures of the report: ``plot.residuals()`` in a notebook; ``dir(plot)`` lists them."""
+        return Plots(self.document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.

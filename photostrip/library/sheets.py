@@ -65,12 +65,12 @@ def plan(
     overrides: keys with other values: ``plan("model", end_lap_percent=70, control={"layout": "six"})``.
     Raises InputError with every fault of the plan.
     """
-    path, source = None, None
+    path, source, rest = None, None, dict[str, Any](overrides)
     if specification is not None:
         schema = f"photostrip_plan_{'cameras' if kind == 'camera' else kind}"
-        path, source = place_of(specification, "specification", schema)
+        path, source, rest = place_of(specification, "specification", overrides, schema)
     with reading_from(source):
-        return planned(kind, path, assignments_of(overrides))
+        return planned(kind, path, assignments_of(rest))
 
 
 def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:

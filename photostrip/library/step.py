@@ -32,7 +32,7 @@ from photostrip.project.sections import Section
 from photostrip.report.page.parts import DASH, Facts
 from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
-from photostrip.sheets.sheet import Rows, Sheet, by_columns
+from photostrip.sheets.sheet import Rows, Sheet, table
 from photostrip.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
@@ -495,11 +495,8 @@ def columns(names: str, form: str, values: Floats) -> list[Column]:
     return [(Field(name, form, name), values[:, k]) for k, name in enumerate(names.split())]
 
 
-def _rows(key: str, title: str, ids: Iterable[str], listed: Sequence[Column], of: str = "") -> Rows:
-    first = Field(of or "id", head=of)
-    return Rows(
-        key, title, (first, *(field for field, _ in listed)), by_columns(ids, *(values for _, values in listed))
-    )
+def _rows(key: str, title: str, ids: Iterable[str], listed: Sequence[Column], of: str = "", **more: Any) -> Rows:  # noqa: ANN401
+    return table(key, title, [(Field(of or "id", head=of), list(ids)), *listed], **more)
 
 
 def _turned_rays(
@@ -555,5 +552,4 @@ def _equations(*words: str) -> Rows:
 def _table(title: str, ids: Iterable[str], listed: Sequence[Column], *words: str) -> Rows:
     """Put columns together under a title and equations."""
     key = re.sub(r"[^a-z0-9]+", "_", re.split(r"[:,]", title.lower())[0])
-    rows = _rows(f"{TRACE}{key}", title, ids, listed)
-    return Rows(rows.key, title, rows.fields, rows.rows, above=words, exact=True)
+    return _rows(f"{TRACE}{key}", title, ids, listed, above=words, exact=True)

@@ -337,7 +337,7 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
 
 def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:
     """Refuse neighbouring models that cannot be linked, and models of the other hand."""
-    from photostrip.pipeline.strip_method import form_models
+    from photostrip.pipeline.formed_models import form_models
 
     for number, strip in enumerate(models.strips):
         try:
