@@ -227,21 +227,21 @@ def image_residuals(result: Result, rank: Numbers) -> list[ImageResiduals]:
 
 
 def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:
-    observations, stages = result.refined.observations, strip.of_photos
-    position = stages.strip.positions(observations)
+    observations, flown = result.refined.observations, strip.of_photos.strip
+    position = flown.positions(observations)
     rows = np.flatnonzero(position >= 0)
     rows = rows[order_of(position[rows], rank[observations.point[rows]])]
     known = np.full((len(observations.point_ids), 3), np.nan)
     known[strip.formed.point] = strip.xyz
     used = np.zeros(len(observations), bool)
-    used[stages.rows] = True
+    used[strip.rows] = True
     places = known[observations.point[rows]]
-    photos = stages.strip.oriented(stages.resection.centers, stages.resection.rotations)
+    photos = flown.oriented(strip.resection.centers, strip.resection.rotations)
     with np.errstate(invalid="ignore"):
         residuals = observations.xy[rows] - project(places, photos, position[rows])
         depth = depths(known, observations.point[rows], photos.centers, photos.rotations, position[rows])
     return ImageResiduals(
-        strip=stages.strip, rows=rows, photo=position[rows], residuals=residuals, depth=depth, used=used[rows]
+        strip=flown, rows=rows, photo=position[rows], residuals=residuals, depth=depth, used=used[rows]
     )
 
 
@@ -343,7 +343,7 @@ def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Document:
 
 
 def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Document:
-    photos, resection = strip.strip.photos, strip.of_photos.resection
+    photos, resection = strip.strip.photos, strip.resection
     centers = strip.intermediate.cartesian_from_intermediate(resection.centers)
     ground = result.output.ground_from_cartesian(centers, ids=[f"at the center of photo {photo}" for photo in photos])
     axes = result.output.axes_at(centers, ground)
@@ -406,8 +406,8 @@ def _angles(rotations: Floats, system: str) -> Floats:
 def _centres(result: Result, number: int, strip: StripResult) -> Document:
     """Return the perspective centres of a strip of independent models, as far as they are known."""
     photos, models = strip.strip.photos, strip.of_models.formed.models
-    known = np.flatnonzero(np.isfinite(strip.centers).all(axis=1))
-    centers = strip.intermediate.cartesian_from_intermediate(strip.centers[known])
+    known = np.flatnonzero(np.isfinite(strip.placed.centers).all(axis=1))
+    centers = strip.intermediate.cartesian_from_intermediate(strip.placed.centers[known])
     names = [f"at the center of photo {photos[row]}" for row in known.tolist()]
     places = coordinates(result, result.output.ground_from_cartesian(centers, ids=names))
     covariances = None if result.precision is None else result.precision.photos[number][known]

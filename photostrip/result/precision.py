@@ -150,7 +150,7 @@ def _summed(sigma: Floats, names: list[str]) -> Document:
 
 def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> Table:
     """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
-    centers = strip.centers.copy()
+    centers = strip.placed.centers.copy()
     known, places = np.isfinite(centers[:, 0]), np.arange(len(centers))
     if not known.any():
         return Table.of_rows("precision.along", ())

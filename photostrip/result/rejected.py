@@ -69,7 +69,7 @@ def _rows(result: Result) -> list[Document]:
     observations = result.refined.observations
     found: list[Document] = []
     for strip in result.strips:
-        if strip.model_stages is None:
+        if not strip.is_of_models:
             found += _from_pairs(strip, observations)
             found += _from_junctions(strip, observations)
             found += _from_rays(strip, observations)

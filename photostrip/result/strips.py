@@ -12,9 +12,10 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
+from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import compare_with_given
 from photostrip.pipeline.precision import mean_points
-from photostrip.pipeline.results import Adjusted, PhotoStages, Result, StripResult
+from photostrip.pipeline.results import Adjusted, Result, StripResult
 from photostrip.points import locate
 from photostrip.result.given import differences, of_used
 from photostrip.result.numbers import MATRIX, record, rms
@@ -87,7 +88,7 @@ def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) 
         "masked_errors_suspected": stages.screened.masked,
         "condition": oriented.condition,
         "iterations": oriented.iterations,
-        "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
+        "base": np.linalg.norm(np.diff(strip.placed.centers, axis=0), axis=1),
         "scale_factor": formed.scale_factor,
         "base_direction_deg": np.degrees(formed.base_direction),
         "base_inclination_deg": np.degrees(formed.base_inclination),
@@ -107,7 +108,7 @@ def _detectable(strip: StripResult) -> Floats:
     return np.where(np.isfinite(worst), worst, np.nan)
 
 
-def _parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:
+def _parallax_limits(of_photos: FormedPhotos, settings: RelativeSettings) -> Floats:
     """Median parallax of each pair, mm, from which on the search takes a point out; NaN where nothing is tested.
 
     A limit that depends on the redundancy of a point is smaller where there is little of it.
@@ -137,7 +138,7 @@ def discrepancies(strip: StripResult) -> Floats:
     Returns (t, 3), metres along the strip, to its left and up, of every pass point of every junction, or of everything
         common to two independent models; NaN where its rays were left out.
     """
-    formed = strip.of_photos.formed if strip.model_stages is None else strip.of_models.formed
+    formed = strip.of_photos.formed if not strip.is_of_models else strip.of_models.formed
     common = formed.junctions if isinstance(formed, FormedStrip) else formed.links.shared
     gap = formed.model_xyz[common.after] - formed.model_xyz[common.before]
     similarity = strip.absolute.similarity
@@ -215,11 +216,11 @@ def _independent_models(strip: StripResult) -> Table:
         "points_rejected": np.bincount(models.model[point], minlength=models.count) - used,
         "centers": np.bincount(models.model[~point], minlength=models.count),
         "redundancy": None,
-        "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
+        "base": np.linalg.norm(np.diff(strip.placed.centers, axis=0), axis=1),
         "base_formed": np.linalg.norm(np.diff(formed.centers, axis=0), axis=1) * strip.absolute.similarity.scale,
         "scale_factor": formed.places.scale,
-        "model_scale": strip.of_models.scales,
-        **dict(zip(MATRIX, strip.of_models.rotations.reshape(-1, 9).T, strict=True)),
+        "model_scale": strip.models.scales,
+        **dict(zip(MATRIX, strip.models.rotations.reshape(-1, 9).T, strict=True)),
     }
     return Table.of("models", columns)
 
@@ -299,10 +300,10 @@ def residuals_of(result: Result, rank: Numbers) -> Table:
 
 def strip_of(result: Result, strip: StripResult) -> Document:
     """Return a row of ``strips``: what a strip is like and how well it holds together."""
-    of_photos = strip.model_stages is None
+    of_photos = not strip.is_of_models
     formed = strip.of_photos.formed.junctions if of_photos else strip.of_models.formed.links
     gap = discrepancies(strip)[formed.used]  # rms() passes over points left out for their rays
-    base = np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)
+    base = np.linalg.norm(np.diff(strip.placed.centers, axis=0), axis=1)
     base = base[np.isfinite(base)]
     return {
         "id": strip.strip.id,
@@ -325,13 +326,13 @@ def strip_of(result: Result, strip: StripResult) -> Document:
 
 
 def _fit_of_photos(result: Result, strip: StripResult) -> Document:
-    sums, stages = Parallaxes.of(strip), strip.of_photos
+    sums, oriented = Parallaxes.of(strip), strip.of_photos.orientation
     return {
-        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[stages.rows]),
+        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[strip.rows]),
         "sigma0_um": 1000.0 * sigma0_of_pairs(sums.squares, sums.redundancy),
         "redundancy": int(sums.redundancy.sum()),
-        "rms_parallax_um": 1000.0 * rms(stages.orientation.parallax[stages.orientation.used]),
-        "image_rms_um": 1000.0 * rms(stages.resection.residuals),
+        "rms_parallax_um": 1000.0 * rms(oriented.parallax[oriented.used]),
+        "image_rms_um": 1000.0 * rms(strip.resection.residuals),
     }
 
 
@@ -362,7 +363,7 @@ def _found_drift(strip: StripResult) -> float:
     correction = strip.polynomial
     if correction is None or not correction.axes[0].terms:
         return np.nan
-    start, end = (_scale_change(correction, x) for x in strip.centers[[0, -1], 0])
+    start, end = (_scale_change(correction, x) for x in strip.placed.centers[[0, -1], 0])
     return end - start
 
 

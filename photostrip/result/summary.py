@@ -193,7 +193,7 @@ def counts_of(result: Result, measurements: int) -> Document:
     transfers = [each.formed.junctions.used for each in photos]
     transfers += [strip.of_models.formed.links.used for strip in result.model_strips]
     bundle = result.bundle
-    used = sum(len(each.rows) for each in photos)
+    used = sum(len(strip.rows) for strip in result.photo_strips)
     if bundle is not None and not result.model_strips:
         used = int(bundle.screened.selection.images.sum())
     out = [] if bundle is None else [each for each in bundle.screened.rejections if not each.readmitted]
@@ -261,11 +261,12 @@ def summary_of(result: Result, images: Sequence[ImageResiduals], found: Differen
 
 
 def _of_photos(result: Result) -> Document:
-    strips = [strip.of_photos for strip in result.photo_strips]
+    strips = result.photo_strips
     sums = [Parallaxes.of(strip) for strip in result.photo_strips]
     redundancy = np.concatenate([each.redundancy for each in sums])
     sigma = [result.refined.observations.sigma[each.rows].ravel() for each in strips]
-    parallax = [np.abs(each.orientation.parallax[each.orientation.used]).max() for each in strips]
+    oriented = [strip.of_photos.orientation for strip in strips]
+    parallax = [np.abs(each.parallax[each.used]).max() for each in oriented]
     sigma0_um = 1000.0 * sigma0_of_pairs(np.concatenate([each.squares for each in sums]), redundancy)
     values: Document = {
         "sigma0_um": sigma0_um,

@@ -183,7 +183,7 @@ def trace_sheet(result: Result) -> Sheet:
     departures = [] if result.model_strips else departures_of(result)
     tables = [symbols, Rows("departures", "Where this run departs from the textbook", columns, departures)]
     for strip in result.strips:
-        if strip.model_stages is None:
+        if not strip.is_of_models:
             tables += [*_pairs(result, strip, unit), *_chain(strip, unit), *_scale_transfer(result, strip)]
         tables += [*_absolute(result, strip, unit), *_polynomial(result, strip)]
     facts = [Fact("name", result.inputs.name), Fact("angles", unit), Fact("symbols", SYMBOLS)]

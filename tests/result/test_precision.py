@@ -103,9 +103,9 @@ def test_photo_covariances_are_those_of_turned_photos(frame: str) -> None:
     (strip,) = result.strips
     covariance = result.precision.photos[0][number]  # type: ignore[union-attr]
     errors = rng.multivariate_normal(np.zeros(6), covariance, SAMPLES)
-    place = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)[[number]]
+    place = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)[[number]]
     axes = result.output.axes_at(place)[0]
-    rotation = axes @ strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)[number]
+    rotation = axes @ strip.intermediate.cartesian_rotations(strip.resection.rotations)[number]
     turned = axes @ from_vector(errors[:, 3:]) @ axes.T @ rotation
     moved = np.degrees(angles(turned, "alpha-omega-kappa") - angles(rotation, "alpha-omega-kappa"))
     moved = (moved + 180) % 360 - 180

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.photos_on_control import OrientedPhotos, OrientedStrip
 from photostrip.pipeline.precision import fitted, photo_errors
 from photostrip.pipeline.run import triangulate
+from photostrip.pipeline.strip_method import OrientedStrip
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
 from photostrip.strip import fitted_strip as module_of_fit
@@ -55,25 +54,10 @@ def without_noise(wanted: Spec) -> Inputs:
 
 
 def fitted_strip(result: Result, factor: float = 1.0) -> FittedStrip:
-    """Errors of the strip of a result after its fit to the control."""
-    return fitted(result.strips[0], oriented_of(result), factor)
-
-
-def oriented_of(result: Result, number: int = 0) -> OrientedPhotos:
-    """Return a strip of a result as it lay on its control before its deformation was corrected."""
-    strip = result.strips[number]
-    photos = strip.of_photos
-    stage = FormedPhotos(
-        strip=photos.strip,
-        observations=result.refined.observations,
-        sigma=photos.sigma,
-        screened=photos.screened,
-        formed=photos.formed,
-        wrong_rays=photos.wrong_rays,
-    )
+    """Errors of the first strip of a result after its fit to the control, before which it lay there undeformed."""
+    strip = result.strips[0]
     oriented = OrientedStrip(
-        strip=photos.strip,
-        formed=photos.formed,
+        stage=strip.of_photos,
         frames=result.frames,
         control=strip.control,
         control_rows=strip.control_rows,
@@ -82,7 +66,7 @@ def oriented_of(result: Result, number: int = 0) -> OrientedPhotos:
         precision=strip.precision,
         settings=result.settings.absolute,
     )
-    return OrientedPhotos(stage, oriented)
+    return fitted(strip, oriented, result.refined.observations, factor)
 
 
 def written_out(errors: StripErrors, rows: csr_array) -> Floats:
@@ -107,11 +91,11 @@ class Placed:
         """Bring a result into a frame."""
         strip = result.strips[0]
         there = strip.intermediate
-        centers = there.cartesian_from_intermediate(strip.of_photos.resection.centers)
+        centers = there.cartesian_from_intermediate(strip.resection.centers)
         return cls(
             frame.intermediate_from_cartesian(strip.cartesian),
             frame.intermediate_from_cartesian(centers),
-            frame.intermediate_rotations(there.cartesian_rotations(strip.of_photos.resection.rotations)),
+            frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations)),
         )
 
     def minus(self, other: Placed) -> tuple[Floats, Floats]:
