@@ -223,7 +223,7 @@ def adjusted(project: Project, settings: Settings) -> Run:
 
 def left_out_by_control(result: Result, cause: str) -> frozenset[str]:
     """Control points that were left out of strips of photos for one of their rays."""
-    o, strips = result.refined.observations, [strip for strip in result.strips if strip.model_stages is None]
+    o, strips = result.refined.observations, [strip for strip in result.strips if not strip.is_of_models]
     rays = [each for strip in strips for each in strip.of_photos.wrong_rays if each.cause == cause]
     return frozenset(o.point_ids[o.point[each.row]] for each in rays)
 
@@ -235,15 +235,15 @@ def taking_part(result: Result, count: int) -> tuple[Flags, Flags]:
         placing[result.bundle.block.rows[result.bundle.screened.selection.images]] = True
         return used, placing
     for strip in result.strips:
-        if strip.model_stages is not None:
-            formed = strip.model_stages.formed
+        if strip.is_of_models:
+            formed = strip.of_models.formed
             shared, rows = formed.links.shared, formed.models.row
             used[rows[np.union1d(shared.before[formed.links.used], shared.after[formed.links.used])]] = True
             placing[rows[formed.used]] = True
         else:
             oriented = strip.of_photos.orientation
             used[oriented.rows[oriented.used].ravel()] = True
-            placing[strip.of_photos.rows] = True
+            placing[strip.rows] = True
     return used, placing
 
 

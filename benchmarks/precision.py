@@ -120,8 +120,8 @@ def true_inputs(spec: Spec) -> Inputs:
 def placed(strip: StripResult, frame: IntermediateFrame) -> tuple[Floats, Floats, Floats]:
     """Points, centres and rotations in the axes of a frame."""
     there = strip.intermediate
-    centers = frame.intermediate_from_cartesian(there.cartesian_from_intermediate(strip.of_photos.resection.centers))
-    rotations = frame.intermediate_rotations(there.cartesian_rotations(strip.of_photos.resection.rotations))
+    centers = frame.intermediate_from_cartesian(there.cartesian_from_intermediate(strip.resection.centers))
+    rotations = frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations))
     return frame.intermediate_from_cartesian(strip.cartesian), centers, rotations
 
 

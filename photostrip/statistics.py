@@ -10,8 +10,8 @@ from scipy.special import chdtrc, chdtri, chndtrinc, fdtrc, ndtri, stdtr, stdtri
 from photostrip.arrays import Floats, Numbers
 
 # A sound result calls for a second look with this probability at the most, by all tests of the verdict together:
-# sigma0, pairs, points that the adjustment has not seen, given points that stand out, deformed models. Each of these
-# five questions has the same share of it, and the tests of a question share that.
+# sigma0, pairs, points that the adjustment has not seen, given points that stand out. Each of these questions
+# has a fifth of it, and the tests of a question share that.
 SECOND_LOOK = 0.01
 TEST_LEVEL = SECOND_LOOK / 5
 SLIGHTLY = 0.05  # probability below which points that were not seen speak against a result that the verdict lets pass

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
-from photostrip.formats.output import result_files
+from photostrip.formats import result_files
 from photostrip.result.description import Columns, described
 from photostrip.simulation.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES
@@ -37,8 +37,8 @@ OVERRIDES = [
     "observations.unit=px",
     "observations.sigma=1e-9",
     "observations.sigma=1e9",
-    "control[0].sigma=[1e-9, 1, 1e9]",
-    "control[0].axes=[up, north, east]",
+    "control[0].sigma=[1e-9,1,1e9]",
+    "control[0].axes=[up,north,east]",
     "control[0].crs=EPSG:4326",
     "control[0].crs=geocentric",
     "output.crs=EPSG:3857",
@@ -102,13 +102,13 @@ def blocks(folder: Path) -> list[dict[str, bytes]]:
     given = {"photos.csv": (folder / "found" / "photos.csv").read_bytes()}
     files = {name: data for name, data in _files_of(path).items() if name in {"observations.csv", "control.csv"}}
     project = path.read_text(encoding="utf-8")
-    listed = re.search(r"  - id: .*\n    camera: (.*)\n    photos: \[(.*)\]\n", project)
+    listed = re.search(r"- id: .*\n  camera: (.*)\n  photos: \[([^]]*)\]\n", project)
     if listed is None:
         raise RuntimeError("the project lists no photos")
     table = '  file: photos.csv\n  crs: "local"\n  axes: [east, north, up]\n'
     observed = f"orientations:\n{table}  role: observed\n  sigma: [0.1, 0.1, 0.1]\n  sigma_angles: [0.01, 0.01, 0.01]\n"
     single = "".join(
-        f"  - {{id: S{number}, camera: {listed[1]}, photos: [{photo}]}}\n"
+        f"- {{id: S{number}, camera: {listed[1]}, photos: [{photo}]}}\n"
         for number, photo in enumerate(listed[2].split(", "))
     )
     alone = project.replace(listed[0], single) + f"orientations:\n{table}  role: approximate\n"

@@ -25,25 +25,15 @@ BASE, HEIGHT, HALF_WIDTH = 900.0, 1500.0, 700.0  # m
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A strip as it is.
+    """A strip as it is: points and perspective centres in metres, rows of the models, from the ground to each in mm."""
 
-    Parameters
-    ----------
-    points, centers : ndarray, shapes (q, 3), (f, 3)
-        Points and perspective centres, metres.
-    model, node : ndarray of int, shape (n,)
-        Rows of the models.
-    scale, rotation, shift : ndarray, shapes (m,), (m, 3, 3), (m, 3)
-        From the ground to each model, mm.
-    """
-
-    points: Floats
-    centers: Floats
-    model: Numbers
+    points: Floats  # (q, 3)
+    centers: Floats  # (f, 3)
+    model: Numbers  # (n,), with `node`: rows of the models
     node: Numbers
-    scale: Floats
-    rotation: Floats
-    shift: Floats
+    scale: Floats  # (m,)
+    rotation: Floats  # (m, 3, 3)
+    shift: Floats  # (m, 3)
 
     @property
     def exact(self) -> Floats:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
-from photostrip.formats.output.result_json import read_result, to_json
+from photostrip.formats.result_json import read_result, to_json
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.layout import to_markdown, to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.formats.output.simulation import project_files
+from photostrip.foreign.simulated import project_files
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.library import result as library
 from photostrip.pipeline.inputs import Settings
@@ -18,7 +18,7 @@ from photostrip.pipeline.run import triangulate
 from photostrip.result.derived import with_derived
 from photostrip.result.description import Block, Columns, described
 from photostrip.result.document import document_of
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.result.table import Table, as_array, in_frame
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Ground, Image, Points, Spec

@@ -19,36 +19,17 @@ if TYPE_CHECKING:
 
 
 def truth_of(simulation: Simulation) -> StartValues:
-    """Return the truth of a simulation in the frame of ``problem_of``.
-
-    Returns
-    -------
-    StartValues
-        Centres, rotations and points, Cartesian, the origin in the middle of the points, metres.
-    """
+    """Return the truth of a simulation in the frame of ``problem_of``: Cartesian, origin amid the points, metres."""
     truth = simulation.truth
     origin = truth.points.xyz.mean(axis=0)
     return StartValues(truth.centers - origin, truth.rotations, truth.points.xyz - origin)
 
 
 def problem_of(simulation: Simulation, *, shift: float = 1.0, turn: float = 1e-3, seed: int = 1) -> BundleProblem:
-    """Make a bundle adjustment of a simulation.
+    """Make a bundle adjustment of a simulation without distortion, film deformation and refraction.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Photos without distortion, film deformation and refraction. Points with one ray are left out of it.
-    shift : float
-        Standard deviation of the start coordinates of centres and points, metres.
-    turn : float
-        Standard deviation of the start rotations about each axis, radians.
-    seed : int
-        Of the random numbers of the start.
-
-    Returns
-    -------
-    BundleProblem
-        Its rays, its control without check points, and a start.
+    It has the rays of points with two or more, the control without check points, and a start that is off the truth by
+    standard deviations of `shift` metres of centres and points, `turn` radians about each axis of the photos.
     """
     seen, control, truth = simulation.observations, simulation.control, truth_of(simulation)
     rays = np.bincount(seen.point, minlength=len(seen.point_ids))[seen.point] > 1

@@ -138,3 +138,33 @@ def test_the_recipe_asks_for_the_same_libraries() -> None:
 def test_the_citation_is_of_this_version() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert (citation["title"], citation["version"]) == ("photostrip", photostrip.__version__)
+
+
+def test_a_release_asks_for_one_version_and_hands_out_no_secret(tmp_path: Path) -> None:
+    """The step that compares the tag runs here as it will there: with this tree it stops at the changelog only."""
+    workflow = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8"))
+    (step,) = [each for each in workflow["jobs"]["build"]["steps"] if "CITATION" in each.get("name", "")]
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace(" (not released)", "")
+    for name, text in (
+        ("CITATION.cff", (ROOT / "CITATION.cff").read_text(encoding="utf-8")),
+        ("CHANGELOG.md", changelog),
+    ):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+
+    def stops(tag: str) -> bool:
+        script = step["run"].replace("python -c", f"PYTHONPATH={ROOT} {sys.executable} -c")
+        ended = subprocess.run(
+            ["bash", "-eo", "pipefail", "-c", script],
+            cwd=tmp_path,
+            env=os.environ | {"GITHUB_REF_NAME": tag},
+            check=False,
+        )
+        return ended.returncode != 0
+
+    assert not stops(f"v{photostrip.__version__}")
+    assert stops("v9.9.9")
+    for other in (changelog.replace("## 0", "## 9"), f"{changelog}(not released)\n"):
+        (tmp_path / "CHANGELOG.md").write_text(other, encoding="utf-8")
+        assert stops(f"v{photostrip.__version__}")
+    assert workflow["permissions"] == {"contents": "read"}
+    assert "secrets." not in (ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8")

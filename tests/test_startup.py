@@ -73,11 +73,6 @@ def test_no_command_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixt
     assert "Commands:" in captured.err
 
 
-def test_python_m_photostrip_is_the_same_command() -> None:
-    done = subprocess.run([sys.executable, "-m", "photostrip", "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout == f"photostrip {photostrip.__version__}\n"
-
-
 DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample
 
 

@@ -16,10 +16,9 @@ import numpy as np
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.foreign.exports import exported
-from photostrip.formats.text.files import LARGEST_FILE, from_disk, read_bytes
-from photostrip.formats.text.findings import Findings
-from photostrip.formats.text.source import Source, digest, reading_from
-from photostrip.formats.text.table_text import LARGEST_TABLE
+from photostrip.formats.faults import Findings
+from photostrip.formats.files import LARGEST_FILE, Source, digest, from_disk, read_bytes, reading_from
+from photostrip.formats.tables import LARGEST_TABLE
 from photostrip.geodesy.crs import grid_names
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document

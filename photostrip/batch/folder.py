@@ -17,10 +17,8 @@ from photostrip import __version__
 from photostrip.batch.evaluation import Answer
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
-from photostrip.formats.text.files import LARGEST_FILE, from_disk
-from photostrip.formats.text.source import digest
-from photostrip.formats.text.writing import sweep, write_files
+from photostrip.formats.batch import SCHEMA, parsed_record, record_text
+from photostrip.formats.files import LARGEST_FILE, digest, from_disk, sweep, write_files
 from photostrip.notes import Document
 
 LOCK = ".batch.lock"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import MEGABYTE, decode, read_bytes
+from photostrip.formats.files import MEGABYTE, decode, read_bytes
 
 PROJECT = "project.yaml"
 ENDINGS = {".yaml", ".yml"}

@@ -138,7 +138,7 @@ def schema(
     An editor that knows JSON Schema completes keys and explains them: write the schema to a file and begin the
     project file with `# yaml-language-server: $schema=photostrip.schema.json`.
     """
-    from photostrip.formats.text.writing import write_text
+    from photostrip.formats.files import write_text
     from photostrip.project.editors import keys_page, schema_of
     from photostrip.result.schema import result_page, result_schema
 

@@ -157,8 +157,8 @@ def _said(progress: Progress, total: int, *, quiet: bool, verbose: bool) -> Call
 
 def _write_summaries(run: Run, code: int, *, html: bool) -> list[InputError]:
     """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
-    from photostrip.formats.output.batch import summary_csv, summary_json
-    from photostrip.formats.text.writing import write_files
+    from photostrip.formats.batch import summary_csv, summary_json
+    from photostrip.formats.files import write_files
     from photostrip.report.commands.batch import batch_junit, batch_sections
     from photostrip.report.html import batch_html
     from photostrip.report.page.layout import to_text
@@ -183,7 +183,7 @@ def _write_summaries(run: Run, code: int, *, html: bool) -> list[InputError]:
 def _print_summary(
     outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
-    from photostrip.formats.output.batch import summary_csv, summary_json
+    from photostrip.formats.batch import summary_csv, summary_json
     from photostrip.report.commands.batch import batch_junit, batch_sections
     from photostrip.report.page.messages import annotated
 

@@ -129,11 +129,11 @@ def convert(
 def _written_for_others(source: Path, target: str, form: str, *, force: bool) -> list[str]:
     """Write a result in the form of another program, all of its files or none; say what is in them."""
     from photostrip.foreign.exports import exported
-    from photostrip.formats.output.result_json import read_result
-    from photostrip.formats.text.writing import write_files
+    from photostrip.formats.files import write_files
+    from photostrip.formats.result_json import read_result
     from photostrip.project.keys import TABLES, form_of
     from photostrip.project.template import refuse_existing
-    from photostrip.result.statement.edited import EDITED, FIX, OF_WORDS, faults_of_edited, is_edited
+    from photostrip.result.certificate import EDITED, FIX, OF_WORDS, faults_of_edited, is_edited
 
     file = source / RESULT if source.is_dir() else source
     place = Path(target)
@@ -165,7 +165,7 @@ def _converted(source: Path, output: Path, options: Mapping[str, Any], *, force:
     from photostrip.foreign.project import project_files, understood
     from photostrip.foreign.sources import own_control
     from photostrip.foreign.tables import Wanted
-    from photostrip.formats.text.writing import write_files
+    from photostrip.formats.files import write_files
     from photostrip.project.template import refuse_existing
 
     control = options["--control"] or own_control(source)
@@ -222,7 +222,7 @@ def _read(source: Path, wanted: Wanted, options: Mapping[str, Any], control: Pat
 
 
 def _faults(options: Mapping[str, Any], control: Path | None) -> Iterator[Fault]:
-    from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH
+    from photostrip.formats.faults import LARGEST_NUMBER, SMALLEST_LENGTH
 
     if options["--sigma"] is None:
         message = "the files do not say how precise an image coordinate is"
@@ -248,8 +248,8 @@ def _faults(options: Mapping[str, Any], control: Path | None) -> Iterator[Fault]
 
 def _numbers(text: str | None, count: int) -> Any:  # noqa: ANN401 (a tuple so long)
     """Read lengths with commas between them, one for all of three; None for anything else."""
-    from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
-    from photostrip.formats.text.numbers import number as read_number
+    from photostrip.formats.faults import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
+    from photostrip.formats.faults import number as read_number
 
     words = (text or "").split(",")
     try:

@@ -48,7 +48,7 @@ def ascii_only() -> bool:
 
 def print_json(document: Document) -> None:
     """Print a document as result.json is written."""
-    from photostrip.formats.output.result_json import to_json
+    from photostrip.formats.result_json import to_json
 
     sys.stdout.write(to_json(document, ascii_only=ascii_only()))
 
@@ -92,7 +92,7 @@ def deliver(
 ) -> None:
     """Write a sheet, or what is drawn of it, where a file is named; print it."""
     if output is not None:
-        from photostrip.formats.text.writing import write_text
+        from photostrip.formats.files import write_text
 
         if draw is not None and output.suffix.lower() == PICTURE:
             write_text(output, draw(sheet.document()).file())
@@ -111,6 +111,6 @@ def deliver(
 def write_rule(depfile: Path | None, target: Path | str | None, files: Sequence[str | Path]) -> None:
     """Write the rule for make, if one is asked for; none of the files that were read is replaced."""
     if depfile is not None and target is not None:
-        from photostrip.formats.text.writing import make_rule, write_text
+        from photostrip.formats.files import make_rule, write_text
 
         write_text(depfile, make_rule(str(target), files), files)

@@ -49,7 +49,7 @@ def init(
     DIR gets project.yaml, observations.csv, control.csv and fiducials.csv. Nothing is overwritten: when one of the
     files exists, none is written. `photostrip check` then names what is still to be filled in.
     """
-    from photostrip.formats.text.writing import write_files
+    from photostrip.formats.files import write_files
     from photostrip.project.template import refuse_existing, template_files
 
     files = template_files(folder.resolve().name or "project")
@@ -180,7 +180,7 @@ def run(
     refined.csv and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also when it is
     LOOK or UNVERIFIED. With --compare-methods and -o, each method gets a folder of its own in DIR.
     """
-    from photostrip.formats.text.writing import write_files, write_text
+    from photostrip.formats.files import write_files, write_text
     from photostrip.library.project import loaded_from
     from photostrip.library.result import RESULT
     from photostrip.notes import counted
@@ -217,8 +217,10 @@ def run(
             write_rule(depfile, output / RESULT, files_read)  # before the result: it must not be the newer of the two
             messages.say(f"wrote {len(result.write(output, html=html))} files to {output}")
         if plots is not None:
-            pictures = result.pictures()
-            write_files(plots, {f"{name}.svg": picture.file() for name, picture in pictures.items()})
+            from photostrip.report.pictures.result import picture_files
+
+            pictures = picture_files(result.document)
+            write_files(plots, pictures)
             messages.say(f"wrote {len(pictures)} pictures to {plots}")
     print_result(result.document, form, width, quiet=quiet, everything=verbose, names=section or ())
     return exit_code(result.status, strict=strict)
@@ -241,7 +243,7 @@ def _compare_methods(
     when none succeeds, the first failure is raised.
     """
     from photostrip.errors import GeometryError, InputError
-    from photostrip.formats.text.writing import write_text
+    from photostrip.formats.files import write_text
     from photostrip.library.project import loaded_from
     from photostrip.pipeline.inputs import METHODS
     from photostrip.report.page.progress import progress

@@ -56,11 +56,11 @@ def report(
     whatever the verdict, as the report of a failed result is a report; with --strict it is 1 unless the verdict is
     GOOD.
     """
-    from photostrip.formats.output.result_json import read_result
-    from photostrip.formats.text.writing import write_files, write_text
+    from photostrip.formats.files import write_files, write_text
+    from photostrip.formats.result_json import read_result
     from photostrip.library.result import report_of
     from photostrip.report.sections.accuracy_report import sections_of
-    from photostrip.result.statement.edited import as_reported, faults_of_edited
+    from photostrip.result.certificate import as_reported, faults_of_edited
     from photostrip.result.verdict import exit_code
 
     wanted = form or form_of(output or Path(), "--output")
@@ -106,8 +106,8 @@ def statement(
     not known well enough, a result that FAILED or is UNVERIFIED, a local frame. FILE may end in .txt, .md, .html or
     .json.
     """
-    from photostrip.formats.output.result_json import read_result
-    from photostrip.result.statement.accuracy_statement import exit_code, statement_document
+    from photostrip.formats.result_json import read_result
+    from photostrip.result.statement import exit_code, statement_document
 
     wanted = form or form_of(output or Path(), "--output")
     file = _saved(result)
@@ -119,7 +119,7 @@ def statement(
         if output is None and wanted == "json":
             print_json(found)
             return exit_code(found["status"])
-        from photostrip.formats.text.writing import write_text
+        from photostrip.formats.files import write_text
         from photostrip.report.sections.statement import statement_report
         from photostrip.sheets.sheet import rendered
 
@@ -167,8 +167,7 @@ def compare(
     beside the standard deviations, and the gross errors that were not found. With --again, in place of a baseline, the
     project is adjusted again as the certificate of the result says; files that have changed since are a difference.
     """
-    from photostrip.formats.output.result_json import text_of
-    from photostrip.formats.output.result_lines import line_finder
+    from photostrip.formats.result_json import line_finder, text_of
     from photostrip.library.comparison import compare as compared
     from photostrip.library.comparison import compare_again, results_below
     from photostrip.project.tolerances import load_tolerances
@@ -229,8 +228,8 @@ def _update(result: Path, baseline: Path, allowed: Tolerances | None) -> str:
     """Write a result as the baseline; return what changes by it."""
     from photostrip.comparison import baseline_of, compare_results
     from photostrip.errors import InputError
-    from photostrip.formats.output.result_json import read_baseline, read_result, to_json
-    from photostrip.formats.text.writing import write_text
+    from photostrip.formats.files import write_text
+    from photostrip.formats.result_json import read_baseline, read_result, to_json
     from photostrip.library.comparison import place_of
     from photostrip.report.commands.compare import headline
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +15,7 @@ import typer
 from photostrip.cli.failures import failures_as
 from photostrip.cli.options import Assigned, Printed, Rule, Silent, Written
 from photostrip.cli.output import Messages, check_target, deliver, write_rule
+from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, PhotostripError
 from photostrip.planning import PlanKind
 from photostrip.strip import StepName
 from photostrip.terrestrial import TerrestrialKind
@@ -121,12 +127,43 @@ def step(
         deliver(computed(name, str(file), assignments or [], trace=trace), form, output, quiet=quiet)
 
 
-def sources(form: Printed = "text") -> None:
-    """Compute every worked number of the sources again.
+def sources(
+    place: Annotated[
+        str | None,
+        typer.Argument(metavar="PLACE", help="Do what stands there, as '001 eq. 138'.", show_default=False),
+    ] = None,
+    form: Printed = "text",
+    inputs: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Write what the commands of the sources read."),
+    ] = None,
+) -> int:
+    """Compute every worked number of the sources again; with a place, run what shows it.
 
-    Lists every misprint, and the command and the function for every equation.
+    Lists every misprint, every conclusion with whether it holds, and for every equation its number, command and
+    function. Exit code 1: a number is not the one that is known.
     """
     with failures_as(form):
-        from photostrip.sheets.sources import sources_sheet
+        from photostrip.sheets.sources import found_places, places_sheet, shown_places, sources_sheet, write_inputs
 
-        deliver(sources_sheet(), form)
+        if inputs is not None:
+            write_inputs(inputs)
+        if place is None:
+            if inputs is None:
+                deliver(sources_sheet(), form)
+            return 0
+        shown = shown_places(found_places(place), _typed)
+        deliver(places_sheet(shown), form)
+        return 0 if all(each.agrees for each in shown) else 1
+
+
+def _typed(arguments: Sequence[str], folder: Path) -> str:
+    """Run a command of this program in a folder, as a shell would, and return what it prints."""
+    here = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # also where the program is not installed
+    command = [sys.executable, "-m", "photostrip", *arguments]
+    done = subprocess.run(  # noqa: S603 (a row of the table)
+        command, cwd=folder, env=os.environ | here, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    if done.returncode not in {EXIT_DONE, EXIT_TOLERANCE}:
+        raise PhotostripError(f"`photostrip {shlex.join(arguments)}` ended with {done.returncode}: {done.stderr}")
+    return done.stdout

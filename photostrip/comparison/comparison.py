@@ -1,4 +1,4 @@
-"""The comparison of a result with a baseline, as one plain document from which every output is rendered."""
+"""Two results beside each other: numbers by the kind of their tolerance, ids, choices and findings as sets."""
 
 from __future__ import annotations
 
@@ -7,21 +7,210 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.comparison.members import members_of, missing_and_new
-from photostrip.comparison.quantities import ComparedNumber, quantities_of
-from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
-from photostrip.result.description import LEFT_OUT
+from photostrip.result.certificate import OF_VALUES, faults_of_edited
+from photostrip.result.description import LEFT_OUT, Block, Columns, Quantity, described
 from photostrip.result.distances import difference_in_plan_and_height, plan_and_height
-from photostrip.result.quantities import MATRIX
-from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
+from photostrip.result.numbers import MATRIX
 from photostrip.result.table import Table
+
+WORDS = {"photos": "photo", "points": "point", "control": "given point", "strips": "strip", "models": "model"}
+Member = tuple[str, str, str]  # block, id, what it is
+
+
+def members_of(document: Document, kind: str) -> set[Member]:
+    """Return the members of one set of a result: ``ids``, ``choices``, ``rejected`` or ``findings``."""
+    return set(MEMBERS[kind](document))
+
+
+def missing_and_new(now: set[Member], before: set[Member]) -> tuple[list[Document], list[Document]]:
+    """Return what stands in the baseline only, and what in the result only, in order."""
+    return [_plain(each) for each in sorted(before - now)], [_plain(each) for each in sorted(now - before)]
+
+
+def _plain(member: Member) -> Document:
+    block, name, what = member
+    return {"block": block, "id": name, "what": what}
+
+
+def _ids(document: Document) -> Iterator[Member]:
+    for block, word in WORDS.items():
+        for name in names_of(document[block]):
+            yield block, name, f"{word} {name}"
+
+
+def _choices(document: Document) -> Iterator[Member]:
+    """Return what is neither a number nor an id, but decides what the numbers are."""
+    yield "status", "", f"status {document['status']}"
+    yield "adjustment", "", f"adjustment {document['adjustment']}"
+    for block in document.get("polynomials", []):
+        yield "polynomials", block["strip"], f"degree {block['degree']} of strip {block['strip']}"
+        for axis in "xyz":
+            terms = " ".join(document["polynomial_terms"].where(strip=block["strip"], axis=axis)["term"]) or "none"
+            yield "polynomials", block["strip"], f"terms of {axis}, strip {block['strip']}: {terms}"
+    for row in document["points"]:
+        if row["role"] != "new":
+            yield "points", row["id"], f"{row['id']} is {row['role']}"
+    for row in document["control"]:
+        yield "control", row["id"], f"{row['id']} counts as {row['role']} in {row['use']}"
+    for each in document["tolerances"]:
+        yield "tolerances", each["name"], f"tolerance {each['name']} {'kept' if each['passed'] else 'NOT KEPT'}"
+
+
+def _rejected(document: Document) -> Iterator[Member]:
+    for row in document["rejected"]:
+        if not row["readmitted"]:
+            photos = " – ".join(photo for photo in (row["photo"], row["other_photo"]) if photo)
+            where = f" on {photos}" if photos else ""
+            yield "rejected", row["point"], f"{row['point']}{where}, {row['stage'].replace('_', ' ')}"
+
+
+def _findings(document: Document) -> Iterator[Member]:
+    """Return notes by their code and what they are about; their words hold numbers that are compared elsewhere."""
+    for note in document["notes"]:
+        about = [f"strip {note['strip']}"] if note["strip"] else []
+        about += [f"photo {photo}" for photo in note["photos"]] + [f"point {point}" for point in note["points"]]
+        yield "notes", note["code"], f"{note['severity']} {note['code']}{': ' if about else ''}{', '.join(about)}"
+    for each in document.get("findings", []):
+        about = [f"{one} {name}" for one in ("strip", "photo", "point") for name in each[f"{one}s"]]
+        words = f"{each['severity']} {each['code']}, {each['title']}{': ' if about else ''}{', '.join(about)}"
+        yield "findings", each["code"], words
+    for row in document["not_determined"]:
+        yield "not_determined", row["id"], f"point {row['id']} has no coordinates"
+
+
+MEMBERS = {"ids": _ids, "choices": _choices, "rejected": _rejected, "findings": _findings}
+
+
+# Kinds of quantities and the unit of their absolute tolerances. Statistics have two: metres, micrometres.
+UNITS = {
+    "plan": "m",
+    "height": "m",
+    "rotation": "deg",
+    "sigma0": "um",
+    "scale": "",
+    "precision": "m",
+    "statistics": "m",
+    "counts": "",
+}
+SETS = ("ids", "choices", "rejected", "findings")
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Tolerance of one kind of quantity; the larger of its two parts counts."""
+
+    absolute: float = 0.0
+    relative: float = 0.0  # difference allowed, as a share of the size in the baseline
+    absolute_um: float = 0.0  # as `absolute`, for statistics in micrometres
+    ignore: bool = False
+
+
+@dataclass(frozen=True)
+class SetTolerance:
+    """How many elements of a set may be missing or new."""
+
+    missing: int = 0
+    new: int = 0
+    ignore: bool = False
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Tolerances of all kinds.
+
+    The defaults let pass what another processor or another version of the numerical libraries changes, and hardly
+    anything else: two units of the last digit that result.json shows.
+    """
+
+    # plan, height: ground points, perspective centres and differences at control, metres
+    plan: Tolerance = Tolerance(absolute=0.0002)
+    height: Tolerance = Tolerance(absolute=0.0002)
+    # angle between two rotations, and elements of relative orientation, degrees
+    rotation: Tolerance = Tolerance(absolute=2e-6)
+    sigma0: Tolerance = Tolerance(absolute=0.02)  # standard deviation of an image coordinate of weight one, micrometres
+    scale: Tolerance = Tolerance(relative=1e-8)  # scale factors of models, junctions and of the strip, ratios
+    precision: Tolerance = Tolerance(absolute=0.0002, relative=0.001)
+    statistics: Tolerance = Tolerance(absolute=0.0002, relative=0.001, absolute_um=0.11)
+    counts: Tolerance = Tolerance()
+    # ids, choices, rejected, findings: photos, points, models and given points; adjustment, degrees, terms, roles,
+    # status and verdicts; measurements taken out; notes and points without coordinates
+    ids: SetTolerance = SetTolerance()
+    choices: SetTolerance = SetTolerance()
+    rejected: SetTolerance = SetTolerance()
+    findings: SetTolerance = SetTolerance()
+
+    def of(self, kind: str) -> Tolerance:
+        found: Tolerance = getattr(self, kind)
+        return found
+
+    def allowed(self, kind: str, unit: str, before: float) -> float:
+        """Return the largest difference that is allowed for a number.
+
+        The absolute part of a tolerance holds for numbers in the unit of their kind only: a statistic without a unit
+        has the relative part alone.
+        """
+        tolerance = self.of(kind)
+        absolute = tolerance.absolute if unit == UNITS[kind] else tolerance.absolute_um if unit == "um" else 0.0
+        return max(absolute, tolerance.relative * abs(before))
+
+
+NAME = "name"  # said of the columns that name the rows of a table
+
+
+class ComparedNumber(NamedTuple):
+    """One number of a result."""
+
+    kind: str
+    block: str
+    id: str  # id of the photo, point, model or strip; empty for the whole project
+    name: str
+    unit: str  # its unit; empty for ratios and counts
+    value: float | None  # the number; None where the result has none
+
+
+def quantities_of(document: Document) -> Iterator[ComparedNumber]:
+    """Return all single numbers of a result whose description has a kind of tolerance.
+
+    The combination of block, id and name stands once.
+    """
+    for key, block in described().items():
+        if isinstance(block, Columns) and key in document:
+            yield from _of_table(key, document[key])
+        elif isinstance(block, Block) and key in document:
+            yield from _of_block(key, "", document[key], block)
+
+
+def _of_block(block: str, path: str, values: Document, entries: Block) -> Iterator[ComparedNumber]:
+    for key, value in values.items():
+        entry, name = entries.get(key), f"{path}.{key}" if path else key
+        if isinstance(entry, Block) and isinstance(value, dict):
+            yield from _of_block(block, name, value, entry)
+        elif isinstance(entry, Quantity) and entry.compared:
+            yield ComparedNumber(kind=entry.compared, block=block, id="", name=name, unit=entry.unit, value=value)
+
+
+def _of_table(block: str, table: Table) -> Iterator[ComparedNumber]:
+    ids = names_of(table)
+    for key in table.columns:
+        entry = table.quantities[key]
+        if entry.compared and entry.compared != NAME:
+            for name, value in zip(ids, table.values(key), strict=True):
+                yield ComparedNumber(kind=entry.compared, block=block, id=name, name=key, unit=entry.unit, value=value)
+
+
+def names_of(table: Table) -> list[str]:
+    """Return what the rows of a table are called; a model by its photos, which may stand in several strips."""
+    columns = [table.values(key) for key in table.columns if table.quantities[key].compared == NAME]
+    return [" – ".join(row) for row in zip(*columns, strict=True)]
+
 
 SCHEMA = 1
 RECORDS_IN_SETS = {

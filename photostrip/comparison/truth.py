@@ -10,11 +10,11 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
+from photostrip.result.certificate import OF_VALUES, faults_of_edited
 from photostrip.result.description import block_at
 from photostrip.result.distances import east_north_up, level, plan_and_height
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.result.reading import read
-from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 from photostrip.statistics import chi2_quantile
 
 SCHEMA = 2  # of truth.json

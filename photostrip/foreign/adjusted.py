@@ -23,7 +23,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.network.observations import AFFINE, POINT, PRINCIPAL_DISTANCE, K, P, corrected, corrections
 from photostrip.network.problem import CALIBRATION, BundleCameras
 from photostrip.notes import Document
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.strip.corrections import distortion_reach, image_from_ideal
 from photostrip.strip.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 

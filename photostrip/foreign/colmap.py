@@ -20,8 +20,8 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.foreign.gathering import Origin, Photo, checked_camera, gathered
 from photostrip.foreign.places import LARGEST, Place, unique
 from photostrip.foreign.tables import ForeignBlock
-from photostrip.formats.text.files import BOM, decode, read_bytes
-from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
+from photostrip.formats.faults import LARGEST_NUMBER, shown
+from photostrip.formats.files import BOM, decode, read_bytes
 from photostrip.notes import counted
 from photostrip.strip.pixel_cameras import PixelCamera
 

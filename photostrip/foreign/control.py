@@ -20,11 +20,9 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.tables import ForeignBlock, GivenControl
-from photostrip.formats.measured.columns import numbers
-from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import shown
-from photostrip.formats.text.table_reader import read_table
-from photostrip.formats.text.tables import Column, Table
+from photostrip.formats.faults import Findings, shown, suggestion
+from photostrip.formats.measured import numbers
+from photostrip.formats.tables import Column, Table, read_table
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted, listed

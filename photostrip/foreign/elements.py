@@ -14,9 +14,9 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import InputError
 from photostrip.foreign.places import LARGEST, Place
-from photostrip.formats.text.files import BOM, decode, read_bytes
-from photostrip.formats.text.numbers import LARGEST_NUMBER, NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
+from photostrip.formats.faults import LARGEST_NUMBER, NotANumber, shown
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.files import BOM, decode, read_bytes
 
 DEEPEST = 100  # elements within each other
 

@@ -20,9 +20,9 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.places import Place, unique
 from photostrip.foreign.tables import NORTHERNMOST, ROUND, ForeignBlock, GivenPositions
-from photostrip.formats.text.numbers import NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
-from photostrip.formats.text.table_text import content
+from photostrip.formats.faults import NotANumber, shown
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.tables import content
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.notes import counted
 

@@ -12,8 +12,8 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import InputError
 from photostrip.foreign.places import Place, unique
 from photostrip.foreign.tables import ForeignBlock
-from photostrip.formats.text.files import refuse
-from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
+from photostrip.formats.faults import LARGEST_NUMBER, SMALLEST_LENGTH, shown
+from photostrip.formats.files import refuse
 from photostrip.notes import counted, listed
 from photostrip.strip import corrections
 from photostrip.strip.pixel_cameras import PixelCamera, in_millimetres

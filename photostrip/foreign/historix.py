@@ -18,11 +18,9 @@ from photostrip.arrays import Floats
 from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.tables import NORTHERNMOST, ROUND, ForeignBlock, GivenPositions, Wanted
-from photostrip.formats.measured.columns import numbers, repeated_rows
-from photostrip.formats.text.findings import Findings
-from photostrip.formats.text.numbers import shown
-from photostrip.formats.text.table_reader import read_table
-from photostrip.formats.text.tables import Column, Table
+from photostrip.formats.faults import Findings, shown
+from photostrip.formats.measured import numbers, repeated_rows
+from photostrip.formats.tables import Column, Table, read_table
 from photostrip.notes import counted
 
 INTRINSICS, EXTRINSICS, CONTROL = "camera_model_intrinsics.csv", "camera_model_extrinsics.csv", "gcp.csv"

@@ -17,7 +17,7 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted, require_squares
-from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.result_files import to_csv
 from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles

@@ -23,7 +23,7 @@ from photostrip.foreign.elements import Element, read_elements
 from photostrip.foreign.gathering import checked_camera
 from photostrip.foreign.places import Place, unique
 from photostrip.foreign.tables import WGS84, ForeignBlock
-from photostrip.formats.text.numbers import SMALLEST_LENGTH, shown
+from photostrip.formats.faults import SMALLEST_LENGTH, shown
 from photostrip.notes import counted
 from photostrip.strip.pixel_cameras import PixelCamera
 

@@ -20,7 +20,7 @@ from photostrip.foreign.elements import Element
 from photostrip.foreign.metashape import Chunk, label_of, read_chunk
 from photostrip.foreign.places import unique
 from photostrip.foreign.tables import ForeignBlock, GivenControl, GivenPositions
-from photostrip.formats.text.numbers import SMALLEST_LENGTH, shown
+from photostrip.formats.faults import SMALLEST_LENGTH, shown
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted, listed

@@ -11,8 +11,8 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import InputError
 from photostrip.foreign.places import Place
-from photostrip.formats.text.json_text import read_json
-from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
+from photostrip.formats.faults import LARGEST_NUMBER, shown
+from photostrip.formats.tables import read_json
 
 
 @dataclass(frozen=True)

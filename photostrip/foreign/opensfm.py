@@ -22,9 +22,9 @@ from photostrip.foreign.gathering import Origin, Photo, checked_camera, gathered
 from photostrip.foreign.nodes import Node, read_nodes
 from photostrip.foreign.places import Place
 from photostrip.foreign.tables import ForeignBlock
-from photostrip.formats.text.files import decode, refuse
-from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
-from photostrip.formats.text.table_text import unpacked
+from photostrip.formats.faults import LARGEST_NUMBER, shown
+from photostrip.formats.files import decode, refuse
+from photostrip.formats.tables import unpacked
 from photostrip.notes import counted, listed
 from photostrip.strip.pixel_cameras import PixelCamera
 

@@ -16,7 +16,7 @@ from photostrip.foreign.nodes import Node, read_nodes
 from photostrip.foreign.opensfm import pixels
 from photostrip.foreign.places import unique
 from photostrip.foreign.tables import WGS84, ForeignBlock, GivenControl
-from photostrip.formats.text.numbers import shown
+from photostrip.formats.faults import shown
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted, listed

@@ -18,7 +18,7 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.foreign.opensfm import POINT
-from photostrip.formats.output.result_json import on_one_line as text
+from photostrip.formats.result_json import on_one_line as text
 from photostrip.geodesy.ground_frame import true_axes
 from photostrip.notes import Document, counted
 from photostrip.project.keys import ENDINGS

@@ -17,8 +17,8 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
-from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.output.result_json import on_one_line as text
+from photostrip.formats.result_files import to_csv
+from photostrip.formats.result_json import on_one_line as text
 from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import MEGABYTE
-from photostrip.formats.text.numbers import shown
+from photostrip.formats.faults import shown
+from photostrip.formats.files import MEGABYTE
 
 LARGEST = 4000 * MEGABYTE  # of a file of another program
 

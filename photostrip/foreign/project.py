@@ -10,8 +10,8 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.foreign.tables import ForeignBlock, GivenControl, GivenPositions, Wanted
-from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.text.writing import Content
+from photostrip.formats.files import Content
+from photostrip.formats.result_files import to_csv
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import separable_angles
 from photostrip.notes import counted

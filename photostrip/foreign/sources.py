@@ -8,7 +8,7 @@ from pathlib import Path
 from photostrip.errors import Fault, InputError
 from photostrip.foreign import colmap, historix, metashape, opensfm
 from photostrip.foreign.tables import ForeignBlock, Wanted
-from photostrip.formats.text.files import refuse
+from photostrip.formats.files import refuse
 
 READ = f"a folder with cameras.bin or cameras.txt (COLMAP), reconstruction.json (OpenSfM) or {historix.INTRINSICS} \
 (HISTORIX), or an .xml of cameras (Metashape)"

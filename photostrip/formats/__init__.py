@@ -1,6 +1,6 @@
 """Files as users and other programs write them: the only room that knows csv, gzip and json.
 
-- ``text/``: bytes, text, numbers, CSV tables, each fault with its place; findings; writing whole files or none;
-- ``measured/``: the tables of measured and given coordinates that are read;
-- ``output/``: the documents of plans and surveys, and the files of results.
+- ``files``, ``faults``, ``tables``: bytes and whole files, what is wrong with them and where, CSV and JSON;
+- ``measured``, ``models``, ``terrestrial``: the tables of measured and given coordinates that are read;
+- ``result_json``, ``result_files``, ``batch``: what goes out.
 """

@@ -11,15 +11,14 @@ from typing import Any
 
 from photostrip.comparison import Tolerances, compare_results
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.result_json import checked, parsed, read_baseline, read_result
-from photostrip.formats.text.files import from_disk
-from photostrip.formats.text.source import Source, digest, reading_from, seen_from
+from photostrip.formats.files import Source, digest, from_disk, reading_from, seen_from
+from photostrip.formats.result_json import checked, parsed, read_baseline, read_result
 from photostrip.library.project import loaded_from
 from photostrip.library.result import RESULT, Result
 from photostrip.notes import Document, counted
 from photostrip.project.reading import LARGEST_PROJECT
+from photostrip.result.certificate import is_edited
 from photostrip.result.description import LEFT_OUT
-from photostrip.result.statement.edited import is_edited
 from photostrip.result.table import plain_of
 
 BASELINE = "baseline.json"

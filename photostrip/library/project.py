@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import LARGEST_FILE, from_disk
-from photostrip.formats.text.source import Source, current, digest
-from photostrip.formats.text.source import reading_from as accounted
+from photostrip.formats.files import LARGEST_FILE, Source, current, digest, from_disk
+from photostrip.formats.files import reading_from as accounted
 from photostrip.library.result import Result
 from photostrip.notes import counted
 
@@ -81,7 +80,7 @@ class Project:
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""
-        from photostrip.result.statement.certificate import certificate_of
+        from photostrip.result.certificate import certificate_of
 
         loaded, inputs = self.loaded, self.loaded.inputs
         grids = {Path(grid) for frame in (*computed.frames, computed.output) for grid in frame.grids}
@@ -131,39 +130,33 @@ class Check:
 
 def load(
     project: str | PathLike[str] | Mapping[str, Any],
-    *,
-    tables: Mapping[str, Any] | None = None,
     **overrides: Any,  # noqa: ANN401 (values of a project file)
 ) -> Project:
     """Read a project and all its tables.
 
-    project: the project file; or its content as a mapping, with the tables in memory.
-    tables: with a mapping, its tables by the names that stand under ``file``: data frames, structured arrays, or
-        mappings of names of columns to values.
-    overrides: keys with other values than the file has: ``processing={"adjustment": "bundle"}``.
+    project: the project file; or its content as a mapping, with tables in memory where files are named: data frames,
+        structured arrays, or mappings of names of columns to values.
+    overrides: keys with other values than the project has, ``processing={"adjustment": "bundle"}``; of a mapping data
+        frames of its blocks, too: ``observations=frame, control=frame``, of several lists ``control=[one, other]``.
     Raises InputError with every fault of every file.
     """
-    path, source = place_of(project, "project", tables=tables)
-    return loaded_from(path, assignments_of(overrides), source)
+    path, source, rest = place_of(project, "project", overrides)
+    return loaded_from(path, assignments_of(rest), source)
 
 
 def check(
     project: Project | str | PathLike[str] | Mapping[str, Any],
-    *,
-    tables: Mapping[str, Any] | None = None,
     **overrides: Any,  # noqa: ANN401 (values of a project file)
 ) -> Check:
     """Check a project without adjusting it; a faulty one raises nothing. Its arguments are those of ``load``."""
     if isinstance(project, Project):
         return (project.overridden(**overrides) if overrides else project).check()
-    path, source = place_of(project, "project", tables=tables)
-    return _checked(path, assignments_of(overrides), source)
+    path, source, rest = place_of(project, "project", overrides)
+    return _checked(path, assignments_of(rest), source)
 
 
 def run(
     project: Project | str | PathLike[str] | Mapping[str, Any],
-    *,
-    tables: Mapping[str, Any] | None = None,
     **overrides: Any,  # noqa: ANN401 (values of a project file)
 ) -> Result:
     """Adjust a project. Its arguments are those of ``load``.
@@ -172,23 +165,27 @@ def run(
     """
     if isinstance(project, Project):
         return (project.overridden(**overrides) if overrides else project).run()
-    return load(project, tables=tables, **overrides).run()
+    return load(project, **overrides).run()
 
 
 def place_of(
     given: str | PathLike[str] | Mapping[str, Any],
     name: str,
+    overrides: Mapping[str, Any],
     schema: str = "photostrip",
-    tables: Mapping[str, Any] | None = None,
-) -> tuple[Path, Source | None]:
-    """Return the path of a file, and what it is read from where its content is given, called by a name in messages."""
-    if not isinstance(given, Mapping):
-        if tables is not None:
-            raise InputError(Fault("tables in memory go with a project that is a mapping", "type", str(given)))
-        return Path(given), None
-    from photostrip.project.in_memory import source_of
+) -> tuple[Path, Source | None, dict[str, Any]]:
+    """Return the path of a file, what it is read from where its content is given, and overrides that are no tables.
 
-    return Path(name), source_of(name, {schema: 1, **given}, tables or {})
+    name: what the content is called in messages.
+    """
+    from photostrip.project.in_memory import source_of, with_tables
+
+    if not isinstance(given, Mapping):
+        if with_tables({}, overrides)[0]:
+            raise InputError(Fault("tables in memory go with a project that is a mapping", "type", str(given)))
+        return Path(given), None, dict(overrides)
+    content, rest = with_tables({schema: 1, **given}, overrides)
+    return Path(name), source_of(name, content), rest
 
 
 def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
@@ -252,7 +249,7 @@ class Simulation:
     @property
     def truth(self) -> dict[str, Any]:
         """The content of truth.json: true coordinates, perspective centres, rotations; the errors that were put in."""
-        from photostrip.formats.output.result_json import parsed
+        from photostrip.formats.result_json import parsed
 
         with reading_from(self._source):
             return dict(parsed(TRUTH))
@@ -271,7 +268,7 @@ class Simulation:
 
         Raises InputError where a project stands there that no simulation wrote.
         """
-        from photostrip.formats.text.writing import write_files
+        from photostrip.formats.files import write_files
 
         there = Path(folder) / PROJECT_FILE
         if there.exists() and not there.with_name(TRUTH).exists():
@@ -294,13 +291,13 @@ def simulate(
     overrides: keys with other values: ``flight={"photos": 20}, seed=3``.
     Raises InputError with every fault of the specification.
     """
-    path, source = place_of(specification, "specification", "photostrip_simulation")
+    path, source, rest = place_of(specification, "specification", overrides, "photostrip_simulation")
     with reading_from(source):
-        return simulated(path, assignments_of(overrides))
+        return simulated(path, assignments_of(rest))
 
 
 def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
-    from photostrip.formats.output.simulation import project_files, summary
+    from photostrip.foreign.simulated import project_files, summary
     from photostrip.project.simulation import load_specification
 
     specification = load_specification(path, assignments)

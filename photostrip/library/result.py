@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from os import PathLike
@@ -12,14 +12,14 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.result_json import checked
+from photostrip.formats.result_json import checked
 from photostrip.notes import Document, named
 from photostrip.result import table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.formats.text.writing import Content
+    from photostrip.formats.files import Content
     from photostrip.pipeline.results import Result as Computed
     from photostrip.report.page.parts import Section
     from photostrip.report.pictures.svg import Picture
@@ -88,6 +88,28 @@ def _table(name: str, meaning: str) -> cached_property[Table]:
 
     of.__doc__ = meaning
     return cached_property(of)
+
+
+class Plots:
+    """The pictures that a result holds numbers for, each by a method of its name; a notebook shows what it returns."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+
+    def __getattr__(self, name: str) -> Callable[[], Picture]:
+        """Return what draws a picture; its ``file()`` is SVG."""
+        found = {} if name.startswith("_") else self._by_name()
+        if name not in found:
+            raise AttributeError(f"this result has no picture {name!r}: {', '.join(found)}")
+        return lambda: found[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._by_name()]
+
+    def _by_name(self) -> dict[str, Picture]:
+        from photostrip.report.pictures.result import pictures_of
+
+        return {picture.name.replace("-", "_"): picture for picture in pictures_of(self._document)}
 
 
 class Result:
@@ -207,7 +229,7 @@ class Result:
         Raises InputError for a saved result that is not whole; ValueError for another form.
         """
         from photostrip.report.sections.accuracy_report import NAMES, sections_of
-        from photostrip.result.statement.edited import as_reported, faults_of_edited
+        from photostrip.result.certificate import as_reported, faults_of_edited
 
         _require_form(form, get_args(ReportForm))
         if unknown := sorted(set(sections) - set(NAMES)):
@@ -229,7 +251,7 @@ class Result:
         classes_cm: classes that a contract asks for, by ``plan`` and ``height``.
         Raises InputError with every reason why nothing can be stated.
         """
-        from photostrip.result.statement.accuracy_statement import statement_document
+        from photostrip.result.statement import statement_document
 
         return statement_document(self.document, self.name, classes_cm)
 
@@ -252,8 +274,8 @@ class Result:
         return page | {name: "".join(pieces) for name, pieces in self._files().items()}
 
     def _files(self) -> dict[str, Iterable[str]]:
-        from photostrip.formats.output.result_files import beside_json
-        from photostrip.formats.output.result_json import json_pieces
+        from photostrip.formats.result_files import beside_json
+        from photostrip.formats.result_json import json_pieces
 
         tables = beside_json(self.document, self._resolved, self.computed)
         return tables | {RESULT: json_pieces(self.document)}
@@ -265,11 +287,10 @@ class Result:
 
         return exported(self.document, self._exports).files
 
-    def pictures(self) -> dict[str, Picture]:
-        """Return the pictures of the report by name: a notebook shows them, ``file()`` is the SVG of one."""
-        from photostrip.report.pictures.result import pictures_of
-
-        return {picture.name: picture for picture in pictures_of(self.document)}
+    @property
+    def plot(self) -> Plots:
+        """The pictures of the report: ``plot.residuals()`` in a notebook; ``dir(plot)`` lists them."""
+        return Plots(self.document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
@@ -282,7 +303,7 @@ class Result:
         """
         from pathlib import Path
 
-        from photostrip.formats.text.writing import sweep, write_files
+        from photostrip.formats.files import sweep, write_files
 
         sweep(Path(folder))
         page: dict[str, Content] = {}
@@ -345,7 +366,7 @@ def report_of(
     """Return the report as text, Markdown, HTML, JSON (the document) or annotations of GitHub."""
     match form:
         case "json":
-            from photostrip.formats.output.result_json import to_json
+            from photostrip.formats.result_json import to_json
 
             return to_json(document, ascii_only=ascii_only)
         case "html":
@@ -377,7 +398,7 @@ def read_result(path: str | PathLike[str]) -> Result:
     """
     from pathlib import Path
 
-    from photostrip.formats.output.result_json import read_baseline
+    from photostrip.formats.result_json import read_baseline
 
     file = Path(path)
     return Result(read_baseline(str(file / RESULT if file.is_dir() else file)))

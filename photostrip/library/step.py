@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from photostrip import steps
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.measured.steps import read_rays, read_step
+from photostrip.formats.steps import read_rays, read_step
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.local_frame import geodetic_from_geocentric
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
@@ -32,7 +32,7 @@ from photostrip.project.sections import Section
 from photostrip.report.page.parts import DASH, Facts
 from photostrip.report.page.tables import Field
 from photostrip.sheets.replay import first_rounds
-from photostrip.sheets.sheet import Rows, Sheet, by_columns
+from photostrip.sheets.sheet import Rows, Sheet, table
 from photostrip.steps import Bundle, Rays, Strip, of_rays, one_pair, sigma0_of
 from photostrip.strip import StepName
 from photostrip.strip.corrections import Bending, undistort
@@ -348,14 +348,15 @@ def _frame(file: str, given: keys.FrameKeys) -> Sheet:
 
 def _curvature(file: str, given: keys.CurvatureKeys) -> Sheet:
     ids, (xyz,) = read_step(file, "curvature")
-    fall = steps.curvature(xyz, radius=given.radius)
+    radius = given.radius_of_strip
+    fall = steps.curvature(xyz, radius=radius)
     distance = np.hypot(*(xyz[:, :2] - xyz[:, :2].mean(axis=0)).T)
     listed: list[Column] = [(Field("D", "m 1"), distance), (Field("D2/2R", "m 4"), fall)]
     listed += [(Field("reduced", "m 4"), xyz[:, 2] - fall), (Field("raised", "m 4"), xyz[:, 2] + fall)]
     words = (
         "D from the middle of the points; reduced: z of control before the strip; raised: z of results after; eq. 153"
     )
-    return _sheet("curvature", [_value("R", given.radius, "m")], ids, listed, _equations(words))
+    return _sheet("curvature", [_value("R", radius, "m")], ids, listed, _equations(words))
 
 
 def _pair_scales(file: str, given: keys.PairScalesKeys) -> Sheet:
@@ -494,11 +495,8 @@ def columns(names: str, form: str, values: Floats) -> list[Column]:
     return [(Field(name, form, name), values[:, k]) for k, name in enumerate(names.split())]
 
 
-def _rows(key: str, title: str, ids: Iterable[str], listed: Sequence[Column], of: str = "") -> Rows:
-    first = Field(of or "id", head=of)
-    return Rows(
-        key, title, (first, *(field for field, _ in listed)), by_columns(ids, *(values for _, values in listed))
-    )
+def _rows(key: str, title: str, ids: Iterable[str], listed: Sequence[Column], of: str = "", **more: Any) -> Rows:  # noqa: ANN401
+    return table(key, title, [(Field(of or "id", head=of), list(ids)), *listed], **more)
 
 
 def _turned_rays(
@@ -554,5 +552,4 @@ def _equations(*words: str) -> Rows:
 def _table(title: str, ids: Iterable[str], listed: Sequence[Column], *words: str) -> Rows:
     """Put columns together under a title and equations."""
     key = re.sub(r"[^a-z0-9]+", "_", re.split(r"[:,]", title.lower())[0])
-    rows = _rows(f"{TRACE}{key}", title, ids, listed)
-    return Rows(rows.key, title, rows.fields, rows.rows, above=words, exact=True)
+    return _rows(f"{TRACE}{key}", title, ids, listed, above=words, exact=True)

@@ -24,7 +24,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.observations import LinearisedOrientations, Rays, attitudes_at, positions_at, view
-from photostrip.network.problem import ImageObservations, ModelObservations, Parameters, PreparedProblem
+from photostrip.network.problem import ImageObservations, Parameters, PreparedProblem
 
 COLUMNS_AT_A_TIME = 48  # columns of the inverse that are found at a time
 
@@ -253,7 +253,7 @@ def _blocks(blocks: Floats, column: Numbers, columns: int) -> bsr_array:
     return bsr_array((blocks, column, np.arange(n + 1)), shape=(n * a, columns * b))
 
 
-def _by_photo(blocks: Floats, images: ImageObservations | ModelObservations, photos: int, points: int) -> bsr_array:
+def _by_photo(blocks: Floats, images: ImageObservations, photos: int, points: int) -> bsr_array:
     """Sparse matrix (u m, 3 q) of blocks (n, u, 3), one for each ray."""
     order = np.argsort(images.photo, kind="stable")
     edges = np.searchsorted(images.photo[order], np.arange(photos + 1))

@@ -30,7 +30,6 @@ from photostrip.network.problem import (
     BundleCameras,
     BundleProblem,
     ImageObservations,
-    ModelObservations,
     Parameters,
     PositionObservations,
 )
@@ -169,7 +168,7 @@ class Rays:
 
 def view(problem: BundleProblem, state: Parameters) -> Rays:
     """Compute what all rays, or all model coordinates, should have measured."""
-    if isinstance(problem.images, ModelObservations):
+    if problem.of_models:
         return _models(problem.images, state)
     images, cameras = problem.images, problem.cameras
     photo, weight, unknown = images.photo, 1.0 / images.sigma, cameras.unknown
@@ -208,7 +207,7 @@ class InModels(NamedTuple):
     by_point: Floats  # (n, 3, 3)
 
 
-def in_models(measured: ModelObservations, rows: Numbers, state: Parameters, xyz: Floats) -> InModels:
+def in_models(measured: ImageObservations, rows: Numbers, state: Parameters, xyz: Floats) -> InModels:
     """Compare some rows (n,) of model coordinates with points that lie at ``xyz`` (n, 3).
 
     Shift and rotation count in the Cartesian frame.
@@ -223,7 +222,7 @@ def in_models(measured: ModelObservations, rows: Numbers, state: Parameters, xyz
     return InModels(misfit, white @ by_model, white @ back)
 
 
-def _models(measured: ModelObservations, state: Parameters) -> Rays:
+def _models(measured: ImageObservations, state: Parameters) -> Rays:
     """Compute all model coordinates."""
     found = in_models(measured, np.arange(len(measured)), state, state.points[measured.point])
     turn = state.rotations[measured.photo]
@@ -234,10 +233,10 @@ def _models(measured: ModelObservations, state: Parameters) -> Rays:
     )
 
 
-def whitening(measured: ImageObservations | ModelObservations) -> Floats:
+def whitening(measured: ImageObservations) -> Floats:
     """Matrices W (n, c, c) with W' W the weights of the coordinates of a row."""
     white: Floats = np.eye(measured.sigma.shape[1]) / measured.sigma[:, None, :]
-    if isinstance(measured, ModelObservations) and measured.correlation is not None:
+    if measured.correlation is not None:
         white = np.linalg.inv(np.linalg.cholesky(measured.correlation)) @ white
     return white
 
@@ -258,7 +257,7 @@ def _by_parameters(
     cameras: BundleCameras,
     values: Floats,
     camera: int,
-    images: ImageObservations | ModelObservations,
+    images: ImageObservations,
     ratio: Floats,
 ) -> Floats:
     """Differentiate computed image coordinates of rays of a camera by all its parameters: (n, 2, 10), in sigmas."""

@@ -92,49 +92,29 @@ def _no_numbers() -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class ImageObservations:
-    """Measured rays."""
+    """Measured rays; or points of independent models, ``R' (X - T) / k`` with T, R, k those of the model.
+
+    A ray has c = 2 coordinates, a point of a model, which then stands for the photo, 3.
+    """
 
     # photo, point: (n,): photo and point of each ray. A point is measured at most once on a photo. Any order; by photo
     # is fastest
     photo: Numbers
     point: Numbers
-    xy: Floats  # (n, 2): ideal image coordinates in mm, relative to the principal point
-    sigma: Floats  # (n, 2): their standard deviations in mm
+    xy: Floats  # (n, c): ideal image coordinates relative to the principal point, or right-handed ones of models, mm
+    sigma: Floats  # (n, c): their standard deviations in mm
+    correlation: Floats | None = None  # (n, 3, 3): correlations of the coordinates of models; None: there are none
 
     def __len__(self) -> int:
         return len(self.photo)
+
+    @property
+    def of_models(self) -> bool:
+        return self.xy.shape[1] == 3
 
     def take(self, rows: Flags) -> ImageObservations:
-        return ImageObservations(
-            photo=self.photo[rows], point=self.point[rows], xy=self.xy[rows], sigma=self.sigma[rows]
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class ModelObservations:
-    """Measured coordinates of points of independent models: ``R' (X - T) / k`` with T, R, k those of the model.
-
-    They stand where a network of photos has its rays; ``photo`` is the model.
-    """
-
-    # photo, point: (n,): model and point of each row. A point is measured at most once in a model
-    photo: Numbers
-    point: Numbers
-    xy: Floats  # (n, 3): model coordinates in mm, right-handed
-    sigma: Floats  # (n, 3): their standard deviations in mm
-    correlation: Floats | None = None  # (n, 3, 3): correlations of the three coordinates; None: there are none
-
-    def __len__(self) -> int:
-        return len(self.photo)
-
-    def take(self, rows: Flags) -> ModelObservations:
-        return ModelObservations(
-            photo=self.photo[rows],
-            point=self.point[rows],
-            xy=self.xy[rows],
-            sigma=self.sigma[rows],
-            correlation=None if self.correlation is None else self.correlation[rows],
-        )
+        correlation = None if self.correlation is None else self.correlation[rows]
+        return ImageObservations(self.photo[rows], self.point[rows], self.xy[rows], self.sigma[rows], correlation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +189,8 @@ class AttitudeObservations:
 class BundleCameras:
     """Cameras of the photos, and what is to be calibrated."""
 
-    of_photo: Numbers  # (m,): camera of each photo
-    focal: Floats  # (cameras,): principal distances in mm
+    of_photo: Numbers = field(default_factory=_no_numbers)  # (m,): camera of each photo; of models there are none
+    focal: Floats = field(default_factory=_no_rows)  # (cameras,): principal distances in mm
     # (cameras, 10), or None: a-priori standard deviations of the parameters ``CALIBRATION`` about zero, in mm and
     # powers of mm; infinite: free; 0: not a parameter. None: no calibration
     sigma: Floats | None = None
@@ -267,7 +247,7 @@ class BundleProblem:
     measure are points, too.
     """
 
-    images: ImageObservations | ModelObservations
+    images: ImageObservations
     cameras: BundleCameras
     start: StartValues  # start values; they say how many photos (m) and points (q) there are
     control: ControlObservations = field(default_factory=ControlObservations)
@@ -291,7 +271,7 @@ class BundleProblem:
     @property
     def of_models(self) -> bool:
         """Whether the units are independent models."""
-        return isinstance(self.images, ModelObservations)
+        return self.images.of_models
 
     @property
     def unit(self) -> str:
@@ -417,7 +397,7 @@ def _order(joined: csr_array) -> Numbers:
     return rank if narrower else np.arange(len(rank))
 
 
-def _near_points(images: ImageObservations | ModelObservations, rank: Numbers, points: int) -> list[NearPoints]:
+def _near_points(images: ImageObservations, rank: Numbers, points: int) -> list[NearPoints]:
     """Cut the points with rays into pieces on nearly the same photos."""
     photo = rank[images.photo]
     rays = np.lexsort((photo, images.point))

@@ -27,7 +27,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.adjustment import BundleSolution, Selection
 from photostrip.network.observations import in_models
-from photostrip.network.problem import BundleProblem, ModelObservations
+from photostrip.network.problem import BundleProblem
 from photostrip.network.reliability import IMAGE, JointCofactors, Limit, image_shift
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY, Rejection
 from photostrip.statistics import chi2_quantile
@@ -302,7 +302,7 @@ def _seen(adjusted: Adjusted, rows: Numbers, xyz: Floats) -> _Seen:
     problem, solution, images = adjusted.problem, adjusted.solution, adjusted.problem.images
     (m, r), photo, own = rows.shape, images.photo[rows], images.photo[rows.ravel()]
     nowhere = np.isnan(xyz[:, 0])
-    if isinstance(images, ModelObservations):
+    if images.of_models:
         turned = np.einsum("nij,nj->ni", solution.rotations[own], images.xy[rows.ravel()])
         placed = solution.scales[own, None] * turned + solution.centers[own]
         xyz[nowhere] = placed.reshape(m, r, 3)[nowhere].mean(axis=1)

@@ -27,6 +27,7 @@ from photostrip.notes import Note
 from photostrip.pipeline import block_problem, block_start
 from photostrip.pipeline import block_problem as block_models
 from photostrip.pipeline.block_start import known_of
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import axes_of, compare_with_given
@@ -38,12 +39,13 @@ from photostrip.pipeline.results import (
     BlockProblem,
     BlockStart,
     Bundle,
+    PlacedModels,
     Precision,
     SinglePhoto,
     StripResult,
     Ties,
 )
-from photostrip.pipeline.strip_method import LinkedModels, depth_of
+from photostrip.pipeline.strip_method import depth_of
 from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.rejection import Rejection
 from photostrip.statistics import TEST_LEVEL
@@ -224,12 +226,6 @@ def _strip(
     at_rows = np.searchsorted(number, observations.point[rows])
     oriented = strip.of_photos.strip.oriented(centers, rotations)
     resection = of_known_photos(observations.xy, xyz, position[rows], oriented, rows, at_rows)
-    stages = replace(
-        strip.of_photos,
-        formed=replace(formed, point=number, xyz=shape, model_count=models),
-        resection=resection,
-        rows=rows,
-    )
     return replace(
         strip,
         control_rows=np.minimum(control_at, len(number) - 1),
@@ -237,7 +233,9 @@ def _strip(
         cartesian=cartesian,
         rays=points.rays[inside],
         polynomial=None,
-        photo_stages=stages,
+        stage=replace(strip.of_photos, formed=replace(formed, point=number, xyz=shape, model_count=models)),
+        placed=resection,
+        rows=rows,
     )
 
 
@@ -326,8 +324,8 @@ def _strip_of_models(
     strip: StripResult, models: MeasuredModels, bundle: Bundle, used: Numbers, cartesian: Floats, held: Flags
 ) -> StripResult:
     """Return a strip the points, centres and models of the network, in its own intermediate frame."""
-    stages, frame, measured = strip.of_models, strip.intermediate, models.points
-    formed, solution = stages.formed, bundle.screened.solution
+    stage, frame, measured = strip.of_models, strip.intermediate, models.points
+    formed, solution = stage.formed, bundle.screened.solution
     inside = np.zeros(len(measured), bool)
     inside[used] = True
     in_strip = np.unique(formed.models.node[inside[formed.models.row]])
@@ -340,12 +338,12 @@ def _strip_of_models(
         node_xyz=np.where(known[:, None], formed.node_xyz[place], np.nan),
         node_models=np.bincount(formed.models.node[inside[formed.models.row]], minlength=len(cartesian))[in_strip],
     )
-    centers = np.full((len(stages.strip.photos), 3), np.nan)
+    centers = np.full((len(stage.strip.photos), 3), np.nan)
     of_centers = formed.photos
     there = (of_centers >= 0) & held[of_centers]
     centers[there] = frame.intermediate_from_cartesian(cartesian[of_centers[there]])
     xyz = frame.intermediate_from_cartesian(cartesian[formed.point])
-    own = locate(stages.strip.models, bundle.start.photos)
+    own = locate(stage.strip.models, bundle.start.photos)
     at = np.searchsorted(formed.point, strip.formed.point[strip.control_rows])
     return replace(
         strip,
@@ -355,9 +353,8 @@ def _strip_of_models(
         cartesian=cartesian[formed.point],
         rays=formed.photo_count,
         depth=depth_of(centers, xyz),
-        model_stages=replace(
-            stages,
-            formed=formed,
+        stage=replace(stage, formed=formed),
+        placed=PlacedModels(
             centers=centers,
             rotations=frame.intermediate_rotations(solution.rotations[own]),
             scales=solution.scales[own] * MILLIMETRES,

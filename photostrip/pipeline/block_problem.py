@@ -27,7 +27,6 @@ from photostrip.network.problem import (
     BundleProblem,
     ControlObservations,
     ImageObservations,
-    ModelObservations,
     PositionObservations,
     StartValues,
 )
@@ -303,7 +302,7 @@ def _begin(
     used = np.zeros(int(rows.max(initial=-1)) + 1, bool)
     paired = np.zeros(len(used), bool)
     for strip in start.strips:
-        used[strip.of_photos.rows[strip.of_photos.rows < len(used)]] = True
+        used[strip.rows[strip.rows < len(used)]] = True
         in_pairs = np.unique(strip.of_photos.orientation.rows)
         paired[in_pairs[in_pairs < len(used)]] = True
     inside = used[rows]
@@ -353,7 +352,7 @@ def models_together(
     nodes[found.number] = found.xyz
     for strip in strips:
         places = count + locate(strip.strip.photos, measured.photo_ids)
-        nodes[places] = strip.intermediate.cartesian_from_intermediate(strip.centers)
+        nodes[places] = strip.intermediate.cartesian_from_intermediate(strip.placed.centers)
     names, unit = units_of(models)
     centred = _centred(measured)
     placed = []
@@ -411,14 +410,14 @@ def build_models(
     rows = np.flatnonzero(~rows_of_models(settings.links.drop, measured) & (unit >= 0))
     given, control_rows = control_observations(control, ground.control, observations, start, origin)
     problem = BundleProblem(
-        images=ModelObservations(
+        images=ImageObservations(
             photo=unit[rows],
             point=measured.node[rows],
             xy=_centred(measured)[rows],
             sigma=measured.sigma[rows],
             correlation=None if measured.correlation is None else measured.correlation[rows],
         ),
-        cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
+        cameras=BundleCameras(),
         start=StartValues(
             centers=start.centers - origin,
             rotations=start.rotations,

@@ -31,14 +31,14 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Note
 from photostrip.pipeline import block_problem
 from photostrip.pipeline.block_problem import LEAST_FAR
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import cartesian_of, measured_control
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.photos_on_control import middle_frame
 from photostrip.pipeline.precision import compared_strips, mean_points
 from photostrip.pipeline.results import BlockStart, StripResult
-from photostrip.pipeline.strip_method import LinkedModels, adjust_formed
+from photostrip.pipeline.strip_method import adjust_formed, middle_frame
 from photostrip.plausibility.ids import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.strip import absolute_orientation
@@ -418,8 +418,8 @@ def _together(
     points = _mean_points(strips, len(observations.point_ids), strangers)
     oriented: dict[str, tuple[Floats, Floats]] = {}
     for strip in strips:
-        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
-        turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
+        centers = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
+        turned = strip.intermediate.cartesian_rotations(strip.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
     given = None if strips else points_as_given(inputs, observations, known.orientations)
     points = _with_control(points if given is None else given, observations, known)

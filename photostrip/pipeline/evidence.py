@@ -33,14 +33,12 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.reliability import coordinates_of, joint_cofactors
 from photostrip.notes import Finding
-from photostrip.pipeline import photos_on_control, strip_method
+from photostrip.pipeline.formed_models import OVER, LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos, form_strip
 from photostrip.pipeline.frames import PhotoCoordinates
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
-from photostrip.pipeline.photos_on_control import OrientedStrip, strip_at_control
-from photostrip.pipeline.results import PhotoStages
-from photostrip.pipeline.strip_method import LinkedModels
+from photostrip.pipeline.strip_method import OrientedStrip, orient_on_control, strip_at_control
 from photostrip.plausibility import accepted, flight, units
 from photostrip.plausibility.given_points import far_away
 from photostrip.points import ControlPoints, PhotoPoints, locate, located, take_rows
@@ -91,18 +89,6 @@ def formed_at_distance(stage: FormedPhotos, factor: float, settings: Settings) -
     except (GeometryError, np.linalg.LinAlgError):
         return None
     return form(strip, rays, plain) if usable else None
-
-
-def as_formed(stages: PhotoStages, observations: PhotoPoints) -> FormedPhotos:
-    """Return a strip as a run has formed it, before it met its control."""
-    return FormedPhotos(
-        strip=stages.strip,
-        observations=observations,
-        sigma=stages.sigma,
-        screened=stages.screened,
-        formed=stages.formed,
-        wrong_rays=stages.wrong_rays,
-    )
 
 
 def up(stage: FormedPhotos) -> Floats:
@@ -411,8 +397,7 @@ class HeldStrip:
 
     @classmethod
     def of(cls, stage: FormedPhotos | LinkedModels, control: ControlPoints, settings: Settings) -> HeldStrip:
-        ids = stage.observations.point_ids if isinstance(stage, FormedPhotos) else stage.measured.point_ids
-        rows = rows_of_given(control.ids, stage.formed.point, ids)
+        rows = rows_of_given(control.ids, stage.formed.point, stage.point_ids)
         placed = np.asarray(np.isfinite(stage.formed.xyz).all(axis=1), bool)
         given = np.flatnonzero((rows >= 0) & placed[rows] & control.use.any(axis=1) & ~control.check)
         if len(given) > MOST_POINTS:
@@ -463,9 +448,9 @@ class HeldStrip:
         some = np.flatnonzero(counts.any(axis=1))
         counted = replace(points, use=counts).take(some)
         try:
-            stage, oriented = self._oriented(self._majority(counted, some, frames) if as_given else counted, frames)
+            oriented = self._oriented(self._majority(counted, some, frames) if as_given else counted, frames)
             everything = np.arange(len(points))
-            at_all, at_counted = self._at(stage, oriented, points, everything), self._at(stage, oriented, counted, some)
+            at_all, at_counted = self._at(oriented, points, everything), self._at(oriented, counted, some)
             found = search(at_counted) if as_given else first_search(at_counted)
             if found is None:
                 return None
@@ -491,25 +476,17 @@ class HeldStrip:
         kept[full] = majority(xyz, cartesian_of(control.take(full), frames))
         return control.take(kept)
 
-    def _oriented(
-        self, control: ControlPoints, frames: Sequence[GroundFrame]
-    ) -> tuple[FormedPhotos | LinkedModels, OrientedStrip]:
-        if isinstance(self.stage, FormedPhotos):
-            photos = photos_on_control.orient_on_control(self.stage, control, frames, self.settings.absolute)
-            return photos.stage, photos.oriented
-        linked = strip_method.orient_models_on_control(self.stage, control, frames, self.settings.absolute)
-        return linked.linked, linked.oriented
+    def _oriented(self, control: ControlPoints, frames: Sequence[GroundFrame]) -> OrientedStrip:
+        return orient_on_control(self.stage, control, frames, self.settings.absolute)
 
-    def _at(
-        self, stage: FormedPhotos | LinkedModels, oriented: OrientedStrip, points: ControlPoints, some: Numbers
-    ) -> StripAtControl:
+    def _at(self, oriented: OrientedStrip, points: ControlPoints, some: Numbers) -> StripAtControl:
         """Compare the strip with some of these points."""
         at = replace(oriented, control=points, control_rows=self.rows[some])
         at = replace(at, absolute=replace(oriented.absolute, axes=at.targets.axes(at.at_control)))
         found, similarity = at.misclosures, oriented.absolute.similarity
         turned = found.direction @ similarity.rotation * similarity.scale
-        if isinstance(stage, LinkedModels) and stage.over:
-            turned = turned * strip_method.OVER
+        if isinstance(oriented.stage, LinkedModels) and oriented.stage.over:
+            turned = turned * OVER
         place = some[found.point]
         block = self.covariance.reshape(len(self.rows), 3, len(self.rows), 3)[place][:, :, place]
         joint = np.einsum("wi,wivj,vj->wv", turned, block, turned) + np.diag(found.variance)

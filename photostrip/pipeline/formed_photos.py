@@ -31,7 +31,6 @@ from photostrip.network.problem import BundleCameras, BundleProblem, BundleSetti
 from photostrip.network.snooping import screen_bundle
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import Inputs, Settings, Strip, kept_rows, rows_of
-from photostrip.pipeline.results import PhotoStages
 from photostrip.plausibility import mosaic
 from photostrip.points import PhotoPoints
 from photostrip.rejection import SEVERAL_RAYS, Rejection
@@ -285,9 +284,21 @@ class FormedPhotos:
         errors = differentiate_strip(self.orientation, self.formed, similarity, self.observations.sigma)
         return errors.with_doubt(self.formed.junctions.doubt / np.sqrt(self.excess))
 
-    def as_left_by(self, stages: PhotoStages) -> FormedPhotos:
-        """Form nothing again: the strip without the wrong images of control that an adjustment found in it."""
-        return replace(self, formed=stages.formed, wrong_rays=stages.wrong_rays)
+    def covariance(self, similarity: Similarity) -> Callable[[Numbers, Floats], Floats]:
+        """Give the covariance of coordinates along directions (w, 3) of rows (w,) of its points, after a similarity."""
+        errors = self.errors(similarity)
+
+        def of(row: Numbers, direction: Floats) -> Floats:
+            along = errors.along(row, direction)
+            first, _ = errors.frames(along)  # no test depends on what moves the whole section
+            return errors.joint_covariance(along, first) * self.excess
+
+        return of
+
+    @property
+    def rejections(self) -> tuple[Rejection, ...]:
+        """Points taken out of pairs."""
+        return self.screened.rejections
 
     def without_images(self, wrong: Mapping[str, Rejection]) -> FormedPhotos:
         o, photo = self.observations, self.strip.positions(self.observations)

@@ -22,13 +22,13 @@ from photostrip.notes import Finding
 from photostrip.pipeline import evidence, given_on_ground, shared_errors
 from photostrip.pipeline.control_readings import find_distance
 from photostrip.pipeline.evidence import of_images, of_units
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import GroundFrames, PhotoCoordinates
 from photostrip.pipeline.given_on_ground import GivenControl, Predicted
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
 from photostrip.pipeline.precision import compared_strips
 from photostrip.pipeline.results import Bundle, Result, StripResult
-from photostrip.pipeline.strip_method import LinkedModels
 from photostrip.plausibility import accepted, flight, ids, units
 from photostrip.plausibility.ids import OrientedRays
 from photostrip.points import PhotoPoints
@@ -136,7 +136,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     as_given = points if result.bundle is None else evidence.ideal(images.observations, images.cameras, settings)
     images = replace(images, observations=points)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
-    formed = [evidence.as_formed(each.of_photos, as_given) for each in stages]
+    formed = [replace(each.of_photos, observations=as_given) for each in stages]
     causes = [] if result.bundle is None else list(shared_errors.of_bundle(result.bundle, inputs))
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
     odd = {each.strip.id for each in formed if given_on_ground.is_doubtful(each, result, predicted)}
@@ -281,7 +281,7 @@ def _of_flight(each: FormedPhotos) -> Iterator[Finding]:
 
 def _of_adjusted_flight(strip: StripResult) -> Iterator[Finding]:
     """Look at the perspective centres of a strip as a bundle has left them."""
-    centers = strip.of_photos.resection.centers
+    centers = strip.resection.centers
     depth = np.full(len(centers), np.median(centers[:, 2]) - np.median(strip.xyz[:, 2]))  # the Earth bends both alike
     return flight.find_odd_centers(centers, depth, np.array([0.0, 0.0, 1.0]), strip.strip.photos, strip.strip.id)
 
@@ -350,7 +350,7 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     found: dict[str, Floats] = {}
     listed, norths = set(given.photos), []
     for strip in result.strips:
-        resection = strip.of_photos.resection
+        resection = strip.resection
         cartesian = strip.intermediate.cartesian_from_intermediate(resection.centers)
         turned = frame.axes_at(cartesian) @ strip.intermediate.cartesian_rotations(resection.rotations)
         found |= zip(strip.strip.photos, turned, strict=True)

@@ -30,11 +30,11 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Finding
 from photostrip.pipeline import control_readings, evidence, shared_errors
 from photostrip.pipeline.evidence import HeldStrip, ImageEvidence
+from photostrip.pipeline.formed_models import LinkedModels, link_strip
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import cartesian_of, rejected_control, rows_of_given
 from photostrip.pipeline.inputs import GivenOrientations, Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.pipeline.results import Result
-from photostrip.pipeline.strip_method import LinkedModels, link_strip
 from photostrip.plausibility import flight, found, given_points, units
 from photostrip.plausibility import flight as given_angles
 from photostrip.plausibility.given_points import LIMIT

@@ -27,8 +27,9 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network.reliability import coordinates_of, joint_cofactors
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.photos_on_control import OrientedPhotos, ScreenedPhotos, precision_of_long_strip
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Precision, Result, StripResult, Ties
+from photostrip.pipeline.strip_method import OrientedStrip, ScreenedStrip
+from photostrip.pipeline.strip_notes import precision_of_long_strip
 from photostrip.plausibility.ids import TiesOfStrips
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip import absolute_orientation, fitted_strip
@@ -40,12 +41,12 @@ from photostrip.strip.fitted_strip import (
     differentiate_photos,
     image_variance,
 )
-from photostrip.strip.strip_errors import StripErrors
+from photostrip.strip.strip_errors import StripErrors, differentiate_strip
 
 
 def join_photos(
     strips: tuple[StripResult, ...],
-    screened: Sequence[ScreenedPhotos],
+    screened: Sequence[ScreenedStrip],
     observations: PhotoPoints,
     given: ControlPoints,
     output: GroundFrame,
@@ -65,7 +66,7 @@ def join_photos(
         notes = (precision_of_long_strip(strip.of_photos.strip, MOST_PHOTOS) for strip in long_strips)
         return replace(joined, notes=(*notes, *joined.notes)) if settings.precision else joined
     each = [
-        precision_of_photos(strip, before.photos, observations, given, of_checks=of_checks)
+        precision_of_photos(strip, before.oriented, observations, given, of_checks=of_checks)
         for strip, before in zip(strips, screened, strict=True)
     ]
     return replace(joined, precision=joined_precision(each, strips, joined.points))
@@ -329,7 +330,7 @@ MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the squ
 
 def precision_of_photos(
     strip: StripResult,
-    on_control: OrientedPhotos,
+    oriented: OrientedStrip,
     observations: PhotoPoints,
     given: ControlPoints,
     *,
@@ -337,23 +338,23 @@ def precision_of_photos(
 ) -> StripPrecision:
     """Covariances of one strip of photos, or ``of_checks`` alone.
 
-    on_control: the same strip before its deformation was corrected.
+    oriented: the same strip before its deformation was corrected.
     observations: ideal image coordinates of the project.
     given: all given points; the check points among them are compared with what is found.
     """
     checks = check_points(strip, given, observations)
-    compared = compare_with_checks(strip, checks.spread(), on_control.oriented.frames)
+    compared = compare_with_checks(strip, checks.spread(), oriented.frames)
     points = np.full((len(strip.xyz), 3, 3), np.nan)
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     stated = strip.of_photos.sigma
     factor, basis = image_variance(strip.of_photos.orientation, stated)
-    found = fitted(strip, on_control, factor)
+    found = fitted(strip, oriented, observations, factor)
     if of_checks:
         points[checks.rows] = found.covariances_of_points(checks.rows)
     else:
         points = found.covariances_of_points(np.arange(len(points)))
-        solved = np.flatnonzero(strip.of_photos.resection.solved)
-        by_photo = photo_errors(strip, on_control.errors, observations)
+        solved = np.flatnonzero(strip.resection.solved)
+        by_photo = photo_errors(strip, found.errors, observations)
         photos[solved] = found.covariances_of_photos(by_photo, solved)
     axes, fit = strip.intermediate.axes, found.fit
     return StripPrecision(
@@ -370,8 +371,7 @@ def precision_of_photos(
 
 def too_long(strip: StripResult) -> bool:
     """Whether a strip was fitted to its control that has too many photos for the covariances of all its points."""
-    stages = strip.photo_stages
-    return stages is not None and len(stages.strip.photos) > MOST_PHOTOS
+    return not strip.is_of_models and len(strip.strip.photos) > MOST_PHOTOS
 
 
 def _control_of(strip: StripResult, point: Numbers, axis: Numbers) -> Numbers:
@@ -385,25 +385,22 @@ def _turned(strip: StripResult, photos: Floats) -> Floats:
     return turn @ photos @ turn.T
 
 
-def fitted(strip: StripResult, on_control: OrientedPhotos, factor: float) -> FittedStrip:
-    """Carry the errors of a strip over the fit to its control, before which it was ``on_control``."""
+def fitted(strip: StripResult, oriented: OrientedStrip, observations: PhotoPoints, factor: float) -> FittedStrip:
+    """Carry the errors of a strip over the fit to its control, before which it was ``oriented``."""
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
-    oriented = on_control.oriented
-    return FittedStrip(
-        errors=on_control.errors,
-        control=oriented.misclosures,
-        fit=on_control.fit(terms),
-        xyz=oriented.xyz,
-        factor=factor,
-    )
+    photos, control = strip.of_photos, oriented.misclosures
+    similarity = oriented.absolute.similarity
+    errors = differentiate_strip(photos.orientation, photos.formed, similarity, observations.sigma)
+    fit = fitted_strip.fit_operator(control, oriented.weights, oriented.at_control, terms, errors.origin)
+    return FittedStrip(errors=errors, control=control, fit=fit, xyz=oriented.xyz, factor=factor)
 
 
 def photo_errors(strip: StripResult, errors: StripErrors, observations: PhotoPoints) -> PhotoErrors:
     """Differentiate the orientation of the photos on their adjusted points."""
-    rows = strip.of_photos.rows
+    rows = strip.rows
     photo = strip.of_photos.strip.positions(observations)[rows]
     point = np.searchsorted(strip.formed.point, observations.point[rows])
-    return differentiate_photos(errors, strip.of_photos.resection, strip.xyz, photo, point, rows)
+    return differentiate_photos(errors, strip.resection, strip.xyz, photo, point, rows)
 
 
 def joint_covariance(result: Result, rows: Numbers) -> Floats:

@@ -19,18 +19,19 @@ from photostrip.network.problem import BundleProblem
 from photostrip.network.reliability import Correlation
 from photostrip.network.snooping import ScreenedBundle
 from photostrip.notes import Finding, Note
+from photostrip.pipeline.formed_models import LinkedModels
+from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip import absolute_orientation as absolute
-from photostrip.strip import corrections, pair_screening
-from photostrip.strip import resection as exterior
+from photostrip.strip import corrections
 from photostrip.strip.control_screening import ScreenedControl
 from photostrip.strip.fitted_strip import CheckErrors
 from photostrip.strip.formed_strip import FormedStrip
 from photostrip.strip.linked_models import FormedModels
 from photostrip.strip.polynomial import Polynomial
-from photostrip.strip.relative_orientation import Orientation
+from photostrip.strip.resection import Resection
 
 if TYPE_CHECKING:
     from photostrip.strip.interior import InteriorOrientation
@@ -39,36 +40,10 @@ ROLES = NEW, CONTROL, CHECK = "new", "control", "check"
 
 
 @dataclass(frozen=True, eq=False)
-class PhotoStages:
-    """What only a strip of photos has."""
+class PlacedModels:
+    """Independent models of a strip in its intermediate frame."""
 
-    strip: Strip
-    sigma: float  # median standard deviation of its image coordinates, mm
-    # relative orientation of its pairs with the search for gross errors: log, zones, detectable errors
-    screened: pair_screening.ScreenedPairs
-    formed: FormedStrip
-    wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
-    resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
-    rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
-
-    @property
-    def orientation(self) -> Orientation:
-        """Relative orientation of the pairs, after screening."""
-        return self.screened.orientation
-
-    @property
-    def rejections(self) -> tuple[Rejection, ...]:
-        """Points taken out of pairs."""
-        return self.screened.rejections
-
-
-@dataclass(frozen=True, eq=False)
-class ModelStages:
-    """What only a strip of independent models has."""
-
-    strip: ModelStrip
-    formed: FormedModels  # the models in one system, and the links between them
-    # (f, 3): adjusted perspective centres in flight order, intermediate frame, metres; NaN where none was measured
+    # (f, 3): adjusted perspective centres in flight order, metres; NaN where none was measured
     centers: Floats
     rotations: Floats  # (k, 3, 3): rotation of each model, model to intermediate frame
     scales: Floats  # (k,): denominator of the scale of each model
@@ -78,6 +53,7 @@ class ModelStages:
 class StripResult:
     """Every stage of one strip of photos or of independent models, in order."""
 
+    stage: FormedPhotos | LinkedModels  # as it was formed; after a bundle with its points
     precision: absolute.PointPrecision  # a-priori standard deviations of a point from one model, metres
     intermediate: IntermediateFrame
     control: ControlPoints  # control that took part
@@ -91,8 +67,8 @@ class StripResult:
     notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
     # control coordinates that were not used; ``control`` says so in its ``use``
     screened_control: ScreenedControl
-    photo_stages: PhotoStages | None = None  # None for independent models
-    model_stages: ModelStages | None = None  # None for photos
+    placed: Resection | PlacedModels  # photos oriented on the adjusted points, or models, intermediate frame
+    rows: Numbers  # (m,): image points that took part in the resections, rows of the observations; of models none
 
     @property
     def wrong_control(self) -> tuple[Rejection, ...]:
@@ -102,40 +78,55 @@ class StripResult:
     @property
     def strip(self) -> Strip | ModelStrip:
         """What was flown: id and photos, and cameras or models."""
-        return self.of_models.strip if self.photo_stages is None else self.photo_stages.strip
+        return self.stage.strip
 
     @property
     def formed(self) -> FormedStrip | FormedModels:
         """The strip in the frame and scale of its first model."""
-        return self.of_models.formed if self.photo_stages is None else self.photo_stages.formed
-
-    @property
-    def centers(self) -> Floats:
-        """Adjusted perspective centres in flight order, intermediate frame, metres; NaN where none is known."""
-        return self.of_models.centers if self.photo_stages is None else self.photo_stages.resection.centers
+        return self.stage.formed
 
     @property
     def scale_number(self) -> float:
         """Denominator of the photo scale, or of the mean scale of the models."""
-        if self.photo_stages is None:
-            return float(np.exp(np.log(self.of_models.scales).mean()))
-        return self.depth / (self.photo_stages.strip.camera.principal_distance / 1000)
+        if isinstance(self.placed, PlacedModels):
+            return float(np.exp(np.log(self.placed.scales).mean()))
+        return self.depth / (self.of_photos.strip.camera.principal_distance / 1000)
 
     @property
-    def of_photos(self) -> PhotoStages:
-        """What only a strip of photos has; to be asked of such a strip alone."""
-        if self.photo_stages is None:
+    def is_of_models(self) -> bool:
+        return isinstance(self.stage, LinkedModels)
+
+    @property
+    def of_photos(self) -> FormedPhotos:
+        """The stage of a strip of photos; to be asked of such a strip alone."""
+        if isinstance(self.stage, LinkedModels):
             msg = "a strip of independent models"
             raise TypeError(msg)
-        return self.photo_stages
+        return self.stage
 
     @property
-    def of_models(self) -> ModelStages:
-        """What only a strip of independent models has; to be asked of such a strip alone."""
-        if self.model_stages is None:
-            msg = "a strip of photos"
-            raise TypeError(msg)
-        return self.model_stages
+    def of_models(self) -> LinkedModels:
+        """The stage of a strip of independent models; to be asked of such a strip alone."""
+        if isinstance(self.stage, LinkedModels):
+            return self.stage
+        msg = "a strip of photos"
+        raise TypeError(msg)
+
+    @property
+    def resection(self) -> Resection:
+        """Photos oriented on the adjusted points; to be asked of a strip of photos alone."""
+        if isinstance(self.placed, Resection):
+            return self.placed
+        msg = "a strip of independent models"
+        raise TypeError(msg)
+
+    @property
+    def models(self) -> PlacedModels:
+        """Models on the ground; to be asked of a strip of independent models alone."""
+        if isinstance(self.placed, PlacedModels):
+            return self.placed
+        msg = "a strip of photos"
+        raise TypeError(msg)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,10 +39,16 @@ from photostrip.pipeline.given_points import (
     unchecked_control_notes,
 )
 from photostrip.pipeline.inputs import AUTO, BUNDLE, POLYNOMIAL, Inputs, Settings, require_runnable, require_whole
-from photostrip.pipeline.photos_on_control import on_control
 from photostrip.pipeline.precision import join_photos, join_strips, mean_points, not_determined
 from photostrip.pipeline.results import AdjustedStrips, Fold, Result
-from photostrip.pipeline.strip_method import adjust_formed, adjust_photos, as_single_photos, form_photos, form_strips
+from photostrip.pipeline.strip_method import (
+    adjust_formed,
+    adjusted,
+    as_single_photos,
+    form_photos,
+    form_strips,
+    on_control,
+)
 from photostrip.points import PhotoPoints
 from photostrip.strip import corrections
 
@@ -121,7 +127,7 @@ def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, gr
     else:
         strips = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
         points, singles = mean_points(strips).xyz, ()
-    of_strips = [strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips]
+    of_strips = [strip.intermediate.cartesian_from_intermediate(strip.placed.centers) for strip in strips]
     centers = np.concatenate([*of_strips, *(single.center[None] for single in singles)])
     frame = ground.control[0] if ground.control else ground.output
     return Heights(float(_heights(centers, frame).mean()), float(_heights(points, frame).mean()))
@@ -311,9 +317,9 @@ def _adjusted(
         return join_strips(of_models, observations, ground.output)
     photos = [stage for stage in formed if isinstance(stage, FormedPhotos)]
     if whole is not None:  # without the wrong images of control that the whole adjustment found
-        photos = [stage.as_left_by(strip.of_photos) for stage, strip in zip(photos, whole.strips, strict=True)]
+        photos = [strip.of_photos for strip in whole.strips]
     screened = [on_control(stage, control, ground.control, settings, searched=whole is not None) for stage in photos]
-    strips = tuple(adjust_photos(strip, settings) for strip in screened)
+    strips = tuple(adjusted(strip, settings) for strip in screened)
     # 6 back to the map, with standard deviations
     of_checks = whole is not None
     return join_photos(strips, screened, observations, inputs.control, ground.output, settings, of_checks=of_checks)

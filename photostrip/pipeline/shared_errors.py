@@ -39,10 +39,10 @@ from photostrip.network.problem import CALIBRATION
 from photostrip.network.reliability import CONTROL, Parameter
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.evidence import OnControl
+from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.results import Bundle, Result
-from photostrip.pipeline.strip_method import LinkedModels
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import CAUSES, Evidence
 from photostrip.plausibility.given_points import Shared, ShiftedList, StretchedHeights, find_shared, significant

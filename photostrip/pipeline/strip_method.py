@@ -1,162 +1,321 @@
-"""A strip of independent models: its models linked, its perspective centres moved with the ground below them.
+"""The strip method: strips formed without any control, laid on it, and corrected for what the similarity leaves.
 
-All strips of a project: formed without any control, and corrected by polynomials for what the similarity leaves.
+Laid on control: intermediate frame, absolute orientation, what contradicts it taken out. Corrected by polynomials; then
+photos are oriented on the adjusted points, and perspective centres of models moved with the ground below them.
 
-Source: [001] eq. 150-152.
+Source: [001] eq. 142-152.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geometry.similarity import Similarity
-from photostrip.network.adjustment import BundleSolution, solve
-from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
-from photostrip.network.reliability import joint_cofactors
-from photostrip.pipeline import photos_on_control
+from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.geometry.similarity import Similarity, similarity_derivatives
+from photostrip.pipeline import strip_notes as notes
+from photostrip.pipeline.formed_models import LinkedModels, link_strip
 from photostrip.pipeline.formed_photos import FormedPhotos, form_strip
+from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import (
     SIMILARITY,
     Inputs,
     ModelStrip,
     Settings,
     Strip,
+    overruling_notes,
     require_measured,
     require_named,
     require_weighted,
-    rows_of_models,
 )
-from photostrip.pipeline.photos_on_control import (
-    OrientedStrip,
-    ScreenedPhotos,
-    control_of,
-    link_notes,
-    strip_at_control,
-    to_ground,
+from photostrip.pipeline.results import PlacedModels, StripResult
+from photostrip.plausibility.given_points import find_shared
+from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.strip import absolute_orientation, fitted_strip, linked_models, polynomial
+from photostrip.strip.control_screening import (
+    EITHER,
+    WRONG_IMAGE,
+    ControlRay,
+    ScreenedControl,
+    StripAtControl,
+    not_screened,
+    screen_control,
 )
-from photostrip.pipeline.results import ModelStages, StripResult
-from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, locate, take_rows
-from photostrip.strip import absolute_orientation, control_screening, linked_models, polynomial
-from photostrip.strip.linked_models import (
-    FormedModels,
-    LinkSettings,
-    ScreenedLinks,
-    StripModels,
-    form_from_models,
-    require_links,
-)
+from photostrip.strip.fitted_strip import Misclosures
+from photostrip.strip.formed_strip import FormedStrip
+from photostrip.strip.linked_models import FormedModels
 from photostrip.strip.polynomial import Polynomial
+from photostrip.strip.resection import Resection, depths, resect
 from photostrip.units import MILLIMETRES
 
-OVER = np.array([1.0, -1.0, -1.0])  # turns a strip by 180 degrees about its X axis
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
 
 
 @dataclass(frozen=True, eq=False)
-class LinkedModels:
-    """A strip of independent models before it meets its control."""
+class OrientedStrip:
+    """A strip, of photos or of independent models, with the similarity that lays it on its control."""
 
-    strip: ModelStrip
-    measured: ModelPoints  # model coordinates of the whole project
-    formed: FormedModels  # with points and models as all its links together place them
-    network: BundleSolution  # of its models alone, in the system of the strip; points are those of the project
-    over: bool = False  # whether the strip has been turned over since
+    stage: FormedPhotos | LinkedModels  # as it was laid
+    frames: Sequence[GroundFrame]  # ground frames of the control lists
+    control: ControlPoints  # control that the strip holds
+    control_rows: Numbers  # (n,): its rows in the strip's points
+    intermediate: IntermediateFrame
+    absolute: absolute_orientation.AbsoluteOrientation
+    precision: absolute_orientation.PointPrecision  # that gave the weights, metres
+    settings: absolute_orientation.AbsoluteSettings
 
     @property
-    def point_precision(self) -> absolute_orientation.PointPrecision:
-        """A-priori standard deviation of a point of one model, in the unit of the strip."""
-        models, places = self.formed.models, self.formed.places
-        turn = places.scale[:, None, None] * places.rotation
-        variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * self.formed.links.factor
-        point = models.node < models.points
-        plan, height = np.median(variance[point, :2].mean(axis=1)), np.median(variance[point, 2])
-        return absolute_orientation.PointPrecision(float(np.sqrt(plan)), float(np.sqrt(height)))
+    def strip(self) -> Strip | ModelStrip:
+        return self.stage.strip
 
-    def overturned(self) -> LinkedModels:
-        """Return the strip turned by 180 degrees about its X axis; its network stays as it was."""
-        return replace(self, formed=self.formed.overturned(), over=not self.over)
+    @property
+    def formed(self) -> FormedStrip | FormedModels:
+        return self.stage.formed
+
+    @cached_property
+    def targets(self) -> absolute_orientation.Targets:
+        """The control in the intermediate frame."""
+        return absolute_orientation.Targets(self.control, self.frames, self.intermediate)
+
+    @property
+    def xyz(self) -> Floats:
+        """Points of the strip after the similarity, intermediate frame, metres, shape (q, 3); worked out anew."""
+        return self.absolute.similarity(self.formed.xyz)
+
+    @cached_property
+    def at_control(self) -> Floats:
+        """Those that are control, shape (n, 3)."""
+        xyz: Floats = self.xyz[self.control_rows]
+        return xyz
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Weights of the control coordinates, shape (n, 3)."""
+        turned = self.targets.turned(self.at_control)
+        return absolute_orientation.weights(turned, self.precision, self.settings.control_weights)
+
+    @cached_property
+    def extent(self) -> tuple[float, float]:
+        """Mean base and half width of the strip, metres; without perspective centres the mean length of a model."""
+        xyz, centers = self.xyz, self.absolute.similarity(self.formed.centers)
+        bases = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+        spacing = np.nanmean(bases) if np.isfinite(bases).any() else np.ptp(xyz[:, 0]) / max(len(bases), 1)
+        return float(spacing), max(np.quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
+
+    @cached_property
+    def misclosures(self) -> Misclosures:
+        """Control coordinates that count."""
+        turned = self.targets.turned(self.at_control)
+        return fitted_strip.misclosures(turned, self.control_rows, self.absolute.axes)
+
+    def misclosure_covariance(self) -> Callable[[Numbers], Floats]:
+        """Covariance of any misclosures at the control, strip and control together, metres^2, but for a similarity."""
+        of_strip, misclosures = self.stage.covariance(self.absolute.similarity), self.misclosures
+
+        def of(some: Numbers) -> Floats:
+            chosen = misclosures.take(some)
+            return np.asarray(of_strip(chosen.row, chosen.direction) + np.diag(chosen.variance), float)
+
+        return of
 
 
-class OrientedModels(NamedTuple):
-    """A strip of independent models with the similarity that lays it on its control."""
+def strip_at_control(
+    oriented: OrientedStrip, rays: Sequence[ControlRay], covariance: Callable[[Numbers], Floats]
+) -> StripAtControl:
+    """Put together what wrong control is searched with.
 
-    linked: LinkedModels  # as it was laid
-    oriented: OrientedStrip
-
-    def misclosure_covariance(self, some: Numbers) -> Floats:
-        """Covariance of misclosures at the control, strip and control together, metres^2, but for a similarity."""
-        linked, similarity = self.linked, self.oriented.absolute.similarity
-        found = self.oriented.misclosures.take(some)
-        node = linked.formed.point[found.row]
-        turned = similarity.rotation * (OVER if linked.over else 1.0)
-        rows, across = np.arange(len(some)), found.direction @ turned * similarity.scale
-        columns = 3 * node[:, None] + np.arange(3)
-        places = (np.repeat(rows, 3), columns.ravel())
-        functions = csr_array((across.ravel(), places), shape=(len(some), 3 * len(linked.network.points)))
-        joint = joint_cofactors(linked.network, functions) * linked.formed.links.factor
-        return np.asarray(joint + np.diag(found.variance), float)
-
-
-class ScreenedModels(NamedTuple):
-    """A strip of independent models on the control that is not contradicted by the strip and the other control."""
-
-    models: OrientedModels
-    screened_control: control_screening.ScreenedControl
-
-
-def models_on_control(
-    linked: LinkedModels,
-    control: ControlPoints,
-    frames: Sequence[GroundFrame],
-    settings: Settings,
-) -> ScreenedModels:
-    """Lay a strip on that of its control which nothing contradicts.
-
-    Raises as ``orient_models_on_control`` does.
+    rays: rays of control points that stand on two photos; models have none.
+    covariance: gives that of some misclosures (w,), strip and control together, metres^2, but for a similarity.
     """
-    models = orient_models_on_control(linked, control, frames, settings.absolute)
-    if settings.links.screening == "none":
-        return ScreenedModels(models, control_screening.not_screened(models.oriented.control))
-    oriented = models.oriented
-    screened = control_screening.screen_control(strip_at_control(oriented, (), models.misclosure_covariance))
-    if screened.rejections:
-        models = orient_models_on_control(linked, screened.kept, frames, settings.absolute)
-    return ScreenedModels(models, screened)
+    coordinates = oriented.misclosures
+    moved = similarity_derivatives(oriented.at_control[coordinates.point], oriented.at_control.mean(axis=0))
+    return StripAtControl(
+        targets=oriented.targets,
+        xyz=oriented.formed.xyz[oriented.control_rows],
+        similarity=oriented.absolute.similarity,
+        weight=oriented.weights,
+        rays=rays,
+        coordinates=coordinates,
+        design=np.einsum("wi,wij->wj", coordinates.direction, moved),
+        covariance=covariance,
+        share=1.0,
+    )
 
 
-def orient_models_on_control(
-    linked: LinkedModels,
+def control_rays(stage: FormedPhotos, control_rows: Numbers) -> list[ControlRay]:
+    """Rays of the control points (n,), rows of the strip's points, that stand on two photos."""
+    rows = stage.rays_in_use
+    point = np.searchsorted(stage.formed.point, stage.observations.point[rows])
+    order = np.argsort(point, kind="stable")
+    low = np.searchsorted(point[order], control_rows)
+    twice = np.flatnonzero(np.bincount(point, minlength=len(stage.formed.point))[control_rows] == 2)
+    both = stage.strip.positions(stage.observations)[rows[order[low[twice, None] + np.arange(2)]]]
+    ray = stage.formed.xyz[control_rows[twice], None] - stage.formed.centers[both]
+    ray /= np.linalg.norm(ray, axis=2)[:, :, None]
+    return [
+        ControlRay(row, other, along)
+        for row, others, directions in zip(twice.tolist(), both[:, ::-1].tolist(), ray, strict=True)
+        for other, along in zip(others, directions, strict=True)
+    ]
+
+
+class ScreenedStrip(NamedTuple):
+    """A strip on the control that is not contradicted by the strip and the other control."""
+
+    oriented: OrientedStrip
+    screened_control: ScreenedControl
+
+
+def orient_on_control(
+    stage: FormedPhotos | LinkedModels,
     control: ControlPoints,
     frames: Sequence[GroundFrame],
     settings: absolute_orientation.AbsoluteSettings,
-) -> OrientedModels:
-    """Lay a strip on its control; upside down where without perspective centres nothing has told which way is up.
+) -> OrientedStrip:
+    """Lay a strip on its control; models upside down where without perspective centres nothing told which way is up.
 
-    Raises GeometryError, InputError when the control does not determine the similarity, or strip and control are of
-        different hands; the strip is named.
+    Raises GeometryError, InputError when the control does not determine the similarity, is left-handed, or strip and
+        control are of different hands; the strip is named.
     """
-    strip, formed = linked.strip, linked.formed
-    inside, rows = control_of(formed, control, linked.measured.point_ids)
+    rows = rows_of_given(control.ids, stage.formed.point, stage.point_ids)
+    held = control.take(rows >= 0), rows[rows >= 0]
+    if isinstance(stage, FormedPhotos):
+        return to_ground(stage, *held, frames, settings)
     try:
-        oriented = to_ground(strip, formed, linked.point_precision, inside, rows, frames, settings)
+        oriented = to_ground(stage, *held, frames, settings)
     except InputError as refusal:
         if not any(fault.code == "left-handed-control" for fault in refusal.faults):
             raise
-        if formed.upright:
-            raise _left_handed(strip) from refusal
-        linked = linked.overturned()
-        oriented = to_ground(strip, linked.formed, linked.point_precision, inside, rows, frames, settings)
+        if stage.formed.upright:
+            raise _left_handed(stage.strip) from refusal
+        oriented = to_ground(stage.overturned(), *held, frames, settings)
     _refuse_other_hand(oriented)
-    return OrientedModels(linked, oriented)
+    return oriented
+
+
+def on_control(
+    stage: FormedPhotos | LinkedModels,
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    settings: Settings,
+    *,
+    searched: bool = False,
+) -> ScreenedStrip:
+    """Lay a strip on that of its control which nothing contradicts.
+
+    searched: whether the control was searched already; then all of it is kept.
+    """
+    oriented = orient_on_control(stage, control, frames, settings.absolute)
+    of_stage = settings.relative if isinstance(stage, FormedPhotos) else settings.links
+    if searched or of_stage.screening == "none":
+        return ScreenedStrip(oriented, not_screened(oriented.control))
+    return reject_wrong_control(oriented)
+
+
+def reject_wrong_control(oriented: OrientedStrip) -> ScreenedStrip:
+    """Take out control that the strip and all other control contradict, and lay the strip on what is left.
+
+    A point with a wrong image leaves the strip; what is left is tested again.
+    """
+    stage, control = oriented.stage, oriented.control
+    rays = control_rays(stage, oriented.control_rows) if isinstance(stage, FormedPhotos) else ()
+    place = strip_at_control(oriented, rays, oriented.misclosure_covariance())
+    if isinstance(stage, FormedPhotos) and find_shared(place):  # by all control, or a list: single points prove nothing
+        return ScreenedStrip(oriented, not_screened(control))
+    screened = screen_control(place)
+    images = {control.ids[each.row]: each for each in screened.rejections if each.cause in {WRONG_IMAGE, EITHER}}
+    kept = screened.kept
+    if images and isinstance(stage, FormedPhotos):
+        stage, kept = stage.without_images(images), control
+    if screened.rejections:
+        oriented = orient_on_control(stage, kept, oriented.frames, oriented.settings)
+    return reject_wrong_control(oriented) if images else ScreenedStrip(oriented, screened)
+
+
+def to_ground(
+    stage: FormedPhotos | LinkedModels,
+    control: ControlPoints,
+    rows: Numbers,
+    frames: Sequence[GroundFrame],
+    settings: absolute_orientation.AbsoluteSettings,
+) -> OrientedStrip:
+    """Intermediate frame with X along the strip, and the similarity into it.
+
+    A provisional similarity in the frame of azimuth 0 gives the direction of the strip and its scale, hence the
+    weights; the final one is made in the frame turned along the strip.
+
+    control: control that the strip holds.
+    rows: (n,), its rows in the points of the strip.
+    Raises GeometryError when the control does not determine the similarity; the strip is named.
+    """
+    strip, formed = stage.strip, stage.formed
+    if not len(control):
+        msg = f"strip {strip.id}: none of its points is a control point"
+        raise GeometryError(msg, photos=strip.photos, code="no-control")
+    try:
+        provisional_frame = middle_frame(control, frames)
+        provisional = absolute_orientation.lay(
+            formed.xyz[rows],
+            absolute_orientation.Targets(control, frames, provisional_frame),
+            control.use.astype(float),
+            formed.xyz,
+        )
+        ends = provisional.similarity(formed.ends)
+        intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
+        precision = stage.point_precision.at(provisional.similarity.scale)
+        targets = absolute_orientation.Targets(control, frames, intermediate)
+        cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
+        turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
+        weight = absolute_orientation.weights(turned, precision, settings.control_weights)
+        final = absolute_orientation.orient(formed.xyz[rows], targets, weight, formed.xyz)
+    except GeometryError as error:
+        msg = f"strip {strip.id}: {error}"
+        raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
+    return OrientedStrip(
+        stage=stage,
+        frames=frames,
+        control=control,
+        control_rows=rows,
+        intermediate=intermediate,
+        absolute=final,
+        precision=precision,
+        settings=settings,
+    )
+
+
+def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
+    """Return the frame at the control's centre of gravity, X to the north.
+
+    control: control; points without plan position do not count, a missing height is taken from the others.
+    Raises GeometryError when no point gives a plan position.
+    """
+    known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
+    chosen = control.take(known)
+    heights = np.where(control.use[:, 2], control.enu[:, 2], np.nan)
+    mean = float(np.nanmean(heights)) if np.isfinite(heights).any() else 0.0
+    cartesian = np.empty((len(chosen), 3))
+    for number, frame in enumerate(frames):
+        rows = chosen.frame == number
+        if rows.any():
+            enu = chosen.enu[rows].copy()
+            enu[~chosen.use[rows, 2], 2] = mean
+            cartesian[rows] = frame.cartesian_from_ground(enu, ids=[chosen.ids[i] for i in np.flatnonzero(rows)])
+    if not len(chosen):
+        msg = "nothing that is given has a plan position"
+        raise GeometryError(msg, points=control.ids, code="too-little-control")
+    if frames[0].kind == "local":
+        return IntermediateFrame.at_local_centre(cartesian, 0.0)
+    lon, lat, height = frames[0].geodetic(cartesian).T
+    lat0, lon0, _ = mean_position(lat, lon, height)
+    return IntermediateFrame.at_centre(cartesian, lat0, lon0, 0.0)
 
 
 def _refuse_other_hand(oriented: OrientedStrip) -> None:
@@ -174,138 +333,6 @@ def _refuse_other_hand(oriented: OrientedStrip) -> None:
         raise _left_handed(oriented.strip)
 
 
-def adjusted_models(screened: ScreenedModels, correction: Polynomial | None) -> StripResult:
-    """Adjust the points, and move the perspective centres with the ground below them."""
-    linked, oriented = screened.models
-    strip, formed = linked.strip, linked.formed
-    xyz = oriented.xyz if correction is None else correction(oriented.xyz)
-    similarity = oriented.absolute.similarity
-    centers = _centers(formed, similarity, correction)
-    return StripResult(
-        precision=oriented.precision,
-        intermediate=oriented.intermediate,
-        control=oriented.control,
-        control_rows=oriented.control_rows,
-        absolute=oriented.absolute,
-        polynomial=correction,
-        xyz=xyz,
-        cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
-        rays=formed.photo_count,
-        depth=depth_of(centers, xyz),
-        notes=(
-            *link_notes(strip, linked.measured, formed),
-            *photos_on_control.wrong_control_notes(strip, screened.screened_control),
-            *photos_on_control.control_notes(strip, oriented.absolute),
-            *photos_on_control.polynomial_notes(strip, correction, xyz),
-        ),
-        screened_control=screened.screened_control,
-        model_stages=ModelStages(
-            strip=strip,
-            formed=formed,
-            centers=centers,
-            rotations=similarity.rotation @ formed.places.rotation,
-            scales=similarity.scale * formed.places.scale * MILLIMETRES,
-        ),
-    )
-
-
-def depth_of(centers: Floats, xyz: Floats) -> float:
-    """Mean height of perspective centres above the points, metres; NaN without any."""
-    known = np.isfinite(centers).any()
-    return float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan")
-
-
-def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
-    """Link the models of a strip and adjust them by themselves, without any control."""
-    formed = form_models(strip, measured, settings)
-    models, places = formed.models, formed.places
-    rows = np.flatnonzero(formed.used)
-    of_project = models.row[rows]
-    nodes = np.zeros((len(measured.point_ids) + len(measured.photo_ids), 3))
-    nodes[formed.node] = formed.node_xyz
-    network = solve(
-        BundleProblem(
-            images=ModelObservations(
-                photo=models.model[rows],
-                point=models.node[rows],
-                xy=models.xyz[rows],
-                sigma=models.sigma[rows],
-                correlation=None if measured.correlation is None else measured.correlation[of_project],
-            ),
-            cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
-            start=StartValues(centers=places.shift, rotations=places.rotation, points=nodes, scales=places.scale),
-            photo_ids=strip.models,
-            point_ids=tuple(map(measured.name, range(len(nodes)))),
-        )
-    )
-    adjusted = linked_models.Similarities(network.scales, network.rotations, network.centers)
-    formed = replace(
-        formed,
-        places=adjusted,
-        model_xyz=adjusted.of(models.model, models.xyz),
-        node_xyz=network.points[formed.node],
-    )
-    return LinkedModels(strip=strip, measured=measured, formed=formed, network=network)
-
-
-def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> FormedModels:
-    """Link the models of a strip and form it, without any control.
-
-    measured: model coordinates of the whole project.
-    Raises GeometryError, InputError when a link cannot be determined, or models are mirror images of each other.
-    """
-    models = models_of(strip, measured, settings.links)
-    shared = linked_models.common(models)
-    try:
-        require_links(shared, models, np.ones(len(shared.link), bool), strip.models)
-    except GeometryError as error:
-        msg = f"strip {strip.id}: {error}"
-        raise GeometryError(msg, photos=strip.photos, code=error.code) from error
-    kept = rows_of_models(settings.links.keep, measured)[models.row]
-    links = linked_models.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
-    _refuse_reflected(strip, links)
-    photos = locate(strip.photos, measured.photo_ids)
-    return form_from_models(models, links, np.where(photos < 0, -1, photos + len(measured.point_ids)))
-
-
-def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) -> StripModels:
-    """Take the models of a strip out of those of the project, row by row in flight order, without what is dropped."""
-    place = locate(measured.model_ids, strip.models)[measured.model]
-    rows = np.flatnonzero(place >= 0)
-    rows = rows[np.lexsort((measured.node[rows], place[rows]))]
-    whole = linked_models.StripModels(
-        count=len(strip.models),
-        points=len(measured.point_ids),
-        row=rows,
-        model=place[rows],
-        node=measured.node[rows],
-        xyz=measured.xyz[rows],
-        sigma=measured.sigma[rows],
-    )
-    left = ~rows_of_models(settings.drop, measured)[rows]
-    return take_rows(whole, left, ("row", "model", "node", "xyz", "sigma"))
-
-
-def _refuse_reflected(strip: ModelStrip, links: ScreenedLinks) -> None:
-    """Refuse models that are mirror images of their neighbours; the smaller group is named."""
-    if not links.reflected.any():
-        return
-    hand = np.concatenate([[0], np.cumsum(links.reflected)]) % 2
-    minority = hand if 2 * hand.sum() <= len(hand) else 1 - hand
-    names = [name for name, odd in zip(strip.models, minority.tolist(), strict=True) if odd]
-    listed = (
-        f"model {names[0]} is a mirror image" if len(names) == 1 else f"models {', '.join(names)} are mirror images"
-    )
-    fault = Fault(
-        f"strip {strip.id}: {listed} of the others: x and y are exchanged, or one axis has the wrong sign",
-        code="mirrored-model",
-        key="models.file",
-        expected="all models in axes of the same hand",
-        fix="exchange x and y in the table, or change the sign of one column",
-    )
-    raise InputError(fault)
-
-
 def _left_handed(strip: Strip | ModelStrip) -> InputError:
     """Say that models and control are of different hands."""
     return InputError(
@@ -320,6 +347,107 @@ def _left_handed(strip: Strip | ModelStrip) -> InputError:
     )
 
 
+def adjust_formed(
+    stage: FormedPhotos | LinkedModels, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> StripResult:
+    """Lay a formed strip on its control and correct its deformation."""
+    return adjusted(on_control(stage, control, frames, settings), settings)
+
+
+def adjusted(screened: ScreenedStrip, settings: Settings) -> StripResult:
+    """Correct the deformation of a strip on its control, and orient its photos or models on the corrected points."""
+    oriented = screened.oriented
+    stage, strip, frame = oriented.stage, oriented.strip, oriented.intermediate
+    correction = _correction(oriented, settings)
+    xyz = oriented.xyz if correction is None else correction(oriented.xyz)
+    wrong = notes.wrong_control_notes(strip, screened.screened_control)
+    held = *notes.control_notes(strip, oriented.absolute), *notes.polynomial_notes(strip, correction, xyz)
+    result = partial(
+        StripResult,
+        stage=stage,
+        precision=oriented.precision,
+        intermediate=frame,
+        control=oriented.control,
+        control_rows=oriented.control_rows,
+        absolute=oriented.absolute,
+        polynomial=correction,
+        xyz=xyz,
+        cartesian=frame.cartesian_from_intermediate(xyz),
+        screened_control=screened.screened_control,
+    )
+    if isinstance(stage, LinkedModels):
+        similarity, formed = oriented.absolute.similarity, stage.formed
+        centers = _centers(formed, similarity, correction)
+        return result(
+            rays=formed.photo_count,
+            depth=depth_of(centers, xyz),
+            notes=(*notes.link_notes(stage.strip, stage.measured, formed), *wrong, *held),
+            placed=PlacedModels(
+                centers=centers,
+                rotations=similarity.rotation @ formed.places.rotation,
+                scales=similarity.scale * formed.places.scale * MILLIMETRES,
+            ),
+            rows=np.zeros(0, np.intp),
+        )
+    rows = stage.rays_in_use
+    photo = stage.strip.positions(stage.observations)[rows]
+    points = np.searchsorted(stage.formed.point, stage.observations.point[rows])
+    resection = _resected(stage, oriented.absolute.similarity, photo, points, xyz)
+    return result(
+        rays=np.bincount(points, minlength=len(xyz)),
+        depth=float(depths(xyz, points, resection.centers, resection.rotations, photo).mean()),
+        notes=(
+            *overruling_notes(settings.relative, strip.id, strip.photos),
+            *notes.screening_notes(stage.strip, stage.screened, stage.sigma),
+            *([] if stage.rays_tested else [notes.rays_not_tested(stage.strip)]),
+            *wrong,
+            *notes.wrong_image_notes(stage.strip, stage.observations, stage.wrong_rays),
+            *notes.pair_notes(stage.strip, stage.orientation),
+            *notes.junction_notes(stage.strip, stage.formed),
+            *held,
+            *([] if correction is None else notes.network_proposal(stage.strip, correction)),
+            *notes.photo_notes(stage.strip, resection),
+        ),
+        placed=resection,
+        rows=rows,
+    )
+
+
+def _correction(oriented: OrientedStrip, settings: Settings) -> polynomial.Polynomial | None:
+    if settings.adjustment == SIMILARITY:
+        return None
+    spacing, breadth = oriented.extent
+    problem = polynomial.FitProblem(
+        xyz=oriented.at_control, targets=oriented.targets, weight=oriented.weights, spacing=spacing, breadth=breadth
+    )
+    return polynomial.fit(problem, settings.polynomial)
+
+
+def _resected(
+    stage: FormedPhotos, similarity: Similarity, photo: Numbers, points: Numbers, adjusted: Floats
+) -> Resection:
+    """Orient every photo on its adjusted points, so that orientations and points belong together."""
+    strip, formed = stage.strip, stage.formed
+    # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
+    shift = _mean_shifts(adjusted - similarity(formed.xyz), points, photo, len(strip.photos))
+    centers = similarity(formed.centers) + shift
+    start = strip.oriented(centers, similarity.rotation @ formed.rotations)
+    resection = resect(stage.observations.xy[stage.rays_in_use], adjusted[points], photo, start)
+    if not resection.solved.any():
+        msg = (
+            f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control do not "
+            "belong together"
+        )
+        raise GeometryError(msg, photos=strip.photos, code="no-photo-oriented")
+    return resection
+
+
+def _mean_shifts(moved: Floats, points: Numbers, photo: Numbers, photos: int) -> Floats:
+    """Mean shifts (photos, 3) of the points on each photo, 0 where it has none; moved: (q, 3), shifts of points."""
+    count = np.maximum(np.bincount(photo, minlength=photos), 1)
+    return np.column_stack([np.bincount(photo, moved[points, axis], photos) / count for axis in range(3)])
+
+
 def _centers(formed: FormedModels, similarity: Similarity, correction: Polynomial | None) -> Floats:
     """Perspective centres, moved with the ground below them."""
     placed = similarity(formed.centers)
@@ -331,6 +459,12 @@ def _centers(formed: FormedModels, similarity: Similarity, correction: Polynomia
     rows = linked_models.displacement_rows(found, above, [axis.terms for axis in axes])
     placed[known] = found + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
     return placed
+
+
+def depth_of(centers: Floats, xyz: Floats) -> float:
+    """Mean height of perspective centres above the points, metres; NaN without any."""
+    known = np.isfinite(centers).any()
+    return float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan")
 
 
 def form_strips(
@@ -383,28 +517,3 @@ def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError)
         return singles if strip in several else [strip]
 
     return replace(inputs, strips=tuple(chain(*map(cut, inputs.strips))))
-
-
-def adjust_photos(screened: ScreenedPhotos, settings: Settings) -> StripResult:
-    """Correct the deformation of a strip and orient its photos on the corrected points."""
-    return photos_on_control.adjusted(screened, _correction(screened.photos.oriented, settings), settings)
-
-
-def adjust_formed(
-    stage: FormedPhotos | LinkedModels, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
-) -> StripResult:
-    """Lay a formed strip on its control and correct its deformation."""
-    if isinstance(stage, FormedPhotos):
-        return adjust_photos(photos_on_control.on_control(stage, control, frames, settings), settings)
-    found = models_on_control(stage, control, frames, settings)
-    return adjusted_models(found, _correction(found.models.oriented, settings))
-
-
-def _correction(oriented: OrientedStrip, settings: Settings) -> polynomial.Polynomial | None:
-    if settings.adjustment == SIMILARITY:
-        return None
-    spacing, breadth = oriented.extent
-    problem = polynomial.FitProblem(
-        xyz=oriented.at_control, targets=oriented.targets, weight=oriented.weights, spacing=spacing, breadth=breadth
-    )
-    return polynomial.fit(problem, settings.polynomial)

@@ -16,7 +16,7 @@ Source: [000] eq. 1, 5-8; [003] eq. 10.8, 10.12.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import erfc, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +32,9 @@ from photostrip.planning.single_model import (
     measured_covariance,
     orientation_operator,
     orientation_parameters,
+    parallaxes,
 )
-from photostrip.statistics import normal_quantile, t_p_value, t_quantile
+from photostrip.statistics import normal_quantile, t_quantile
 from photostrip.strip import relative_orientation
 
 DEFORMATION_TERMS = ("E0", "A", "B", "C", "D")
@@ -164,13 +165,6 @@ class Paraboloid:
         """C and D over their standard deviations, shape (2,)."""
         with np.errstate(divide="ignore", invalid="ignore"):  # parallaxes without any error
             return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
-
-    @property
-    def p_values(self) -> tuple[float, ...]:
-        """Probabilities of larger |t| by chance."""
-        if self.redundancy < LEAST_REDUNDANCY:
-            return tuple(erfc(abs(t) / sqrt(2)) for t in self.t_values.tolist())
-        return tuple(t_p_value(t, self.redundancy) for t in self.t_values.tolist())
 
     def critical(self, alpha: float = 0.05) -> float:
         """Return what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""
@@ -322,7 +316,9 @@ class BentModel:
     """The surface into which errors of the elements bend a model."""
 
     surface: Floats  # (5,): E0, A, B, C, D of the heights, for x and y in mm at photo scale
-    c: Floats  # (q,): what the elements add to the x parallax, eq. 10.9, mm
+    # (q,): what the elements add to the x parallax, eq. 10.9, and the y parallax that they leave, mm
+    c: Floats
+    parallax: Floats
     raised: Floats  # (q, 3): errors of points in the base frame, eq. 10.8: plan by the left ray, heights by the surface
     left: Floats  # (q, 3): what the absolute orientation leaves of the errors
 
@@ -337,6 +333,7 @@ def bend_model(points: Floats, control: ModelControl, base: float, focal: float,
     return BentModel(
         surface=surface_of_elements(turned, 1.0, focal, base),
         c=c,
+        parallax=parallaxes(points, base)[1] @ elements,
         raised=np.column_stack([xy / base * c[:, None], -focal / base * c]),
         left=parts.from_elements,
     )

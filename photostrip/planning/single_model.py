@@ -43,12 +43,18 @@ def influence(points: ArrayLike, base: float) -> Floats:
 
     Source: [000] eq. 2, rederived; checked against differences of the exact intersection.
     """
+    px, py = parallaxes(points, base)
+    along, across, up = ((value / base)[..., None] * px for value in np.asarray(points, float).T * [[1], [1], [-1]])
+    return np.stack([along, across + py / 2, up], axis=-2)
+
+
+def parallaxes(points: ArrayLike, base: float) -> tuple[Floats, Floats]:
+    """Shifts (n, 5) along and across the base, per error of each element, of the right rays at the level of points."""
     x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
     right, zero = x - base, np.zeros_like(x)
     px = np.stack([zero, right / z, -y, (right**2 + z**2) / z, right * y / z], axis=-1)
     py = np.stack([zero + 1.0, y / z, right, right * y / z, z + y**2 / z], axis=-1)
-    along, across, up = ((value / base)[..., None] * px for value in (x, y, -z))
-    return np.stack([along, across + py / 2, up], axis=-2)
+    return px, py
 
 
 def free_influence(points: ArrayLike, base: float) -> Floats:

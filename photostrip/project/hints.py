@@ -9,11 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.formats.measured.control import ControlTable
-from photostrip.formats.measured.exterior import OrientationTable, PositionTable
-from photostrip.formats.measured.measurements import Measurements
-from photostrip.formats.text.findings import meant
-from photostrip.formats.text.tables import Table
+from photostrip.formats.faults import meant
+from photostrip.formats.measured import ControlTable, Measurements, OrientationTable, PositionTable
+from photostrip.formats.tables import Table
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.points import locate

@@ -7,30 +7,84 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from math import isnan
-from os import fspath
+from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.text.source import Source, reading_from
+from photostrip.formats.files import Source, reading_from
+from photostrip.formats.result_files import to_csv
 
 if TYPE_CHECKING:
     from photostrip.notes import Finding, Note
 
 T = TypeVar("T", "Fault", "Finding", "Note")
+FILE = "file"  # key of the table of a block
 PROJECT, SPECIFICATION = "project", "specification"  # what mappings are called in messages
 
 
-def source_of(name: str, content: Mapping[str, Any], tables: Mapping[str, Any]) -> Source:
+def source_of(name: str, content: Mapping[str, Any]) -> Source:
     """Write a project, or a specification, and its tables as the files that they stand for; nothing touches the disk.
 
-    tables: by the name under which the project names them (``file:``): a data frame, a structured array, or a mapping
-        of names of columns to values. None, NaN and masked values are empty cells.
+    content: with tables in place of the names of files: data frames, structured arrays, or mappings of names of columns
+        to values. None, NaN and masked values are empty cells. In messages a table is called as its block.
     """
-    files = {each: _text(each, table) for each, table in tables.items()} | {name: text_of(content, name)}
+    tables: dict[str, Any] = {}
+    files = {name: text_of(_named(content, "", tables), name)}
+    files |= {each: _text(each, table) for each, table in tables.items()}
     return Source({each: _encoded(text, each) for each, text in files.items()})
+
+
+def with_tables(content: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Take tables among overrides, ``observations=table``, into the blocks of a project; return it and the others.
+
+    A list of blocks takes a list of tables, one of a single block a table alone.
+    Raises InputError where the tables of a list are not as many as its blocks.
+    """
+    found, rest = {**content}, dict[str, Any]()
+    for key, value in overrides.items():
+        block, tables = found.get(key, {}), value if isinstance(value, list) else [value]
+        if not tables or not all(map(_is_frame, tables)):
+            rest[key] = value
+        elif isinstance(block, list) and len(block) == len(tables):
+            found[key] = [{**each, FILE: table} for each, table in zip(block, tables, strict=True)]
+        elif isinstance(block, Mapping) and len(tables) == 1:
+            found[key] = {**block, FILE: tables[0]}
+        else:
+            count = len(block) if isinstance(block, list) else 1
+            message = f"{len(tables)} tables are given for {count} of `{key}`"
+            raise InputError(Fault(message, "table-shape", PROJECT, key=key, expected="as many tables, in a list"))
+    return found, rest
+
+
+def _is_frame(value: object) -> bool:
+    """Whether a value can be a table only: a data frame of any library, or a structured array."""
+    return hasattr(value, "columns") or (isinstance(value, np.ndarray) and value.dtype.names is not None)
+
+
+def _named(value: Any, path: str, tables: dict[str, Any]) -> Any:  # noqa: ANN401 (values of a project file)
+    """Return a value with names in place of tables, which are taken out, each named as the block that holds it."""
+    if isinstance(value, list | tuple):
+        return [_named(each, f"{path}[{k}]" if len(value) > 1 else path, tables) for k, each in enumerate(value)]
+    if not isinstance(value, Mapping):
+        return value
+    found = {}
+    for key, each in value.items():
+        if key == FILE and not isinstance(each, str | PathLike):
+            found[key] = _table_names(each, path, tables)
+        else:
+            found[key] = _named(each, f"{path}.{key}" if path else str(key), tables)
+    return found
+
+
+def _table_names(given: Any, path: str, tables: dict[str, Any]) -> Any:  # noqa: ANN401 (tables of any library)
+    """Return the name of a table, or names of several in a list."""
+    if isinstance(given, list) and given:
+        several = (f"{path}.{FILE}[{k}]" for k in range(len(given)))
+        return [each if isinstance(each, str) else _table_names(each, next(several), tables) for each in given]
+    tables[path] = given
+    return path
 
 
 def text_of(value: Any, file: str, key: str = "") -> str:  # noqa: ANN401 (values of a project file)

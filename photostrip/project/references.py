@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from photostrip.errors import Fault
-from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import shown
+from photostrip.formats.faults import shown, suggestion
 from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.project.keys import ProjectFile
 from photostrip.project.reading import NO_FILES, KeyPath, Node, fault_at

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from photostrip.formats.text.source import seen_from
+from photostrip.formats.files import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.keys import Distortion, Ellipsoid, ProjectFile

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
-from photostrip.formats.text.numbers import LARGEST_NUMBER
+from photostrip.formats.faults import LARGEST_NUMBER
 from photostrip.project.reading import read_file
 from photostrip.project.sections import (
     Flag,

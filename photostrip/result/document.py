@@ -7,33 +7,15 @@ from collections.abc import Iterable
 from photostrip import __version__
 from photostrip.notes import Document, Finding, Note
 from photostrip.pipeline.results import Result
-from photostrip.result import conventions, summary
-from photostrip.result.adjustment import (
-    bundle,
-    classical,
-    deformation,
-    junctions,
-    links,
-    pairs,
-    rejected,
-    strips,
-)
+from photostrip.result import bundle, given, points, precision, rejected, strips, summary
 from photostrip.result.derived import with_derived
 from photostrip.result.description import SCHEMA
 from photostrip.result.numbers import natural_rank
-from photostrip.result.points import (
-    checked,
-    cross_validation,
-    given,
-    ground,
-    image_coordinates,
-    lost_say,
-    photos,
-    precision,
-)
-from photostrip.result.statement.evidence import statement_of
+from photostrip.result.statement import statement_of
 from photostrip.result.table import Table, in_frame
 from photostrip.result.verdict import verdict_of
+
+CONCERNED = ("photos", "points", "file", "line", "column", "key")  # of findings and notes: whom, and the cause
 
 
 def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
@@ -44,48 +26,50 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         Numbers are rounded to decimals that lie well below what they are good for.
     """
     rank = natural_rank(result.refined.observations.point_ids)
-    images = photos.image_residuals(result, rank)
+    images = points.image_residuals(result, rank)
     found = given.differences(result)
     numbers = summary.summary_of(result, images, found)
     taken_out, said = rejected.rejected_of(result), (*notes, *result.notes)
     counts = summary.counts_of(result, sum(len(image.rows) for image in images))
-    points = ground.points_of(result, photos.point_rms(result, images), rank)
-    unchecked = checked.unchecked_notes(points, taken_out, counts["image_points"])
-    lost = lost_say.lost_say_notes(result, images, taken_out, said)
+    table = points.points_of(result, points.point_rms(result, images), rank)
+    unchecked = points.unchecked_notes(table, taken_out, counts["image_points"])
+    lost = rejected.lost_say_notes(result, images, taken_out, said)
     body: Document = {
-        "adjustment": conventions.adjustment_of(result),
-        "frame": ground.frame_of(result),
-        "angles": conventions.angles_of(result),
+        "adjustment": summary.adjustment_of(result),
+        "frame": points.frame_of(result),
+        "angles": summary.angles_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
-        "counts": counts | checked.counts_of(points),
-        "conventions": conventions.conventions_of(result),
-        "settings": conventions.settings_of(result),
-        "corrections": conventions.corrections_of(result),
-        "cameras": conventions.cameras_of(result),
-        **image_coordinates.fiducials_of(result),
+        "counts": counts | points.counts_of(table),
+        "conventions": summary.conventions_of(result),
+        "settings": summary.settings_of(result),
+        "corrections": summary.corrections_of(result),
+        "cameras": summary.cameras_of(result),
+        **points.fiducials_of(result),
         "strips": Table.of_rows("strips", (strips.strip_of(result, each) for each in result.strips)),
         "absolute": Table.of_rows("absolute", map(strips.absolute_of, result.strips)),
         **strips.polynomials_of(result),
         **precision.precision_of(result, found),
-        **cross_validation.cross_validation_of(result),
+        **precision.cross_validation_of(result),
         **bundle.bundle_of(result),
-        **classical.classical_of(result),
+        **strips.classical_of(result),
         "control": given.control_of(result, found),
         "misclosures": given.misclosures_of(result),
-        "ties": ground.ties_of(result, rank),
+        "ties": points.ties_of(result, rank),
         "rejected": taken_out,
-        "not_determined": ground.not_determined_of(result),
+        "not_determined": points.not_determined_of(result),
         "findings": Table.of_rows("findings", map(_finding, result.findings)),
-        "notes": Table.of_rows("notes", map(_note, (*said, *lost, *unchecked))),
-        "models": links.models_of(result) if result.model_strips else pairs.models_of(result),
-        **({"links": links.links_of(result)} if result.model_strips else {}),
-        **deformation.deformations_of(result),
-        "junctions": junctions.junctions_of(result),
-        **photos.photos_of(result, images),
-        "points": points,
-        "residuals": bundle.with_reliability(result, images, photos.residuals_of(result, images)),
-        **({"link_residuals": links.residuals_of(result, rank)} if result.model_strips else {}),
+        "notes": Table.of_rows(
+            "notes",
+            (_values(note, "code", "severity", "message", "strip", *CONCERNED) for note in (*said, *lost, *unchecked)),
+        ),
+        "models": strips.independent_models_of(result) if result.model_strips else strips.models_of(result),
+        **({"links": strips.links_of(result)} if result.model_strips else {}),
+        "junctions": strips.junctions_of(result),
+        **points.photos_of(result, images),
+        "points": table,
+        "residuals": bundle.with_reliability(result, images, points.residuals_of(result, images)),
+        **({"link_residuals": strips.residuals_of(result, rank)} if result.model_strips else {}),
     }
     body = in_frame(with_derived(body))
     verdict = verdict_of(body)
@@ -100,36 +84,15 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
 
 
 def _finding(finding: Finding) -> Document:
-    """Return a finding with the keys that a note has too; the numbers of its evidence have six digits."""
-    return {
-        "code": finding.code,
-        "title": finding.title,
-        "severity": finding.severity,
-        "accepted": finding.accepted,
-        "message": finding.message,
-        "fix": finding.fix,
-        "evidence": {
-            name: float(f"{value:.6g}") if isinstance(value, float) else value
-            for name, value in sorted(finding.evidence.items())
-        },
-        "strips": list(finding.strips),
-        "photos": list(finding.photos),
-        "points": list(finding.points),
-        **_cause(finding),
+    """Return a finding; the numbers of its evidence have six digits."""
+    evidence = {
+        name: float(f"{value:.6g}") if isinstance(value, float) else value
+        for name, value in sorted(finding.evidence.items())
     }
+    of_findings = ("code", "title", "severity", "accepted", "message", "fix")
+    return _values(finding, *of_findings) | {"evidence": evidence} | _values(finding, "strips", *CONCERNED)
 
 
-def _note(note: Note) -> Document:
-    return {
-        "code": note.code,
-        "severity": note.severity,
-        "message": note.message,
-        "strip": note.strip,
-        "photos": list(note.photos),
-        "points": list(note.points),
-        **_cause(note),
-    }
-
-
-def _cause(noted: Finding | Note) -> Document:
-    return {"file": noted.file, "line": noted.line, "column": noted.column, "key": noted.key}
+def _values(noted: Finding | Note, *names: str) -> Document:
+    values = {name: getattr(noted, name) for name in names}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, block_at
-from photostrip.result.numbers import plain
-from photostrip.result.quantities import angle_decimals, coordinate_decimals, rounded_column
+from photostrip.result.numbers import angle_decimals, coordinate_decimals, plain, rounded_column
 
 SHOWN = 10  # rows in a notebook
 TEXTS = {"text", "word"}

@@ -1,6 +1,10 @@
 """The verdict on a result: good, not verified, worth a look, or failed; and what to look at, worst first.
 
 It is made from the finished document, so that a saved result has the same verdict; its limits stand first.
+
+Each question has the same level (``TEST_LEVEL``), which its tests share: a probability here is that of the test times
+the number of tests of its question (Bonferroni), so that each is held against the same level. Whether a given point
+stands out beside the others is asked where the differences are made (``given.stand_out``).
 """
 
 from __future__ import annotations
@@ -9,15 +13,104 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter, itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import LOST_SAY, Document, before, counted, listed
-from photostrip.result import own_tests
 from photostrip.result.table import Table
-from photostrip.statistics import SECOND_LOOK, SLIGHTLY, TEST_LEVEL, normal_quantile
+from photostrip.statistics import SECOND_LOOK, SLIGHTLY, TEST_LEVEL, chi2_p_value, f_p_value, normal_quantile
 
-Tests = Mapping[str, float]  # probabilities by chance, of ``own_tests``
+LEAST_STATED = 0.005  # micrometres, which the document rounds to nothing
+
+SIGMA0, RESIDUALS, PAIRS = "sigma0", "image residuals", "pairs"
+CHECKS, LEFT_OUT = "check points", "control left out in turn"
+
+
+class Pair(NamedTuple):
+    """What a pair's sigma0 says."""
+
+    place: int  # its row in ``models``
+    found: float  # sigma0, micrometres
+    others: float  # that of the other pairs together, 0 where there is none
+    # probabilities, of all pairs together, of so large a sigma0 beside the others, and with what is stated
+    among: float
+    beside_stated: float
+
+
+def probabilities(document: Document) -> dict[str, float]:
+    """Return the probability by chance of what each test found, those that could be made."""
+    seen = {CHECKS: _chance_of_checks(document), LEFT_OUT: document.get("cross_validation", {}).get("p")}
+    made = {name: p for name, p in seen.items() if p is not None}
+    found = {
+        SIGMA0: [2 * _larger(sigma0_ratio(document), document["summary"]["redundancy"])],
+        RESIDUALS: [2 * _larger(residuals_ratio(document), 2 * document["counts"]["image_points_used"])],
+        PAIRS: [p for pair in pairs(document) for p in (pair.among, pair.beside_stated)],
+        **{name: [p * len(made)] for name, p in made.items()},
+    }
+    return {name: min(1.0, *values) for name, values in found.items() if values}
+
+
+def stated(document: Document) -> float:
+    """Return the stated standard deviation of an image or model coordinate, micrometres."""
+    return max(float(document["summary"]["sigma_given_um"]), LEAST_STATED)
+
+
+def sigma0_ratio(document: Document) -> float:
+    """Return sigma0 in units of what is stated, of the bundle, or of the pairs or links."""
+    test = document.get("bundle", {}).get("sigma0_test")
+    return float(test["sigma0"] if test else (document["summary"]["sigma0_um"] or 0.0) / stated(document))
+
+
+def residuals_ratio(document: Document) -> float:
+    """Return the image residuals under the final orientations, rms, in units of what is stated.
+
+    They have fewer redundant coordinates than there are: chance makes them smaller than this.
+    """
+    return float((document["summary"]["image_rms_um"] or 0.0) / stated(document))
+
+
+def _larger(ratio: float, redundancy: int) -> float:
+    """Probability of a larger ratio of a standard deviation to the true one by chance."""
+    return chi2_p_value(ratio**2 * redundancy, redundancy)
+
+
+def pairs(document: Document) -> list[Pair]:
+    """Return what every pair's sigma0 says, beside the other pairs and beside what is stated."""
+    columns = (document["models"].values(key) for key in ("sigma0_um", "redundancy"))
+    known = [(k, found, own) for k, (found, own) in enumerate(zip(*columns, strict=True)) if found is not None]
+    squares, redundancy = sum(own * found**2 for _, found, own in known), sum(own for _, _, own in known)
+    tests, given = 2 * len(known), stated(document)
+    pairs = []
+    for place, found, own in known:
+        left = redundancy - own
+        others = (max(squares - own * found**2, 0.0) / left) ** 0.5 if left else 0.0
+        among = f_p_value((found / others) ** 2, own, left) if others and own else 1.0
+        alone = chi2_p_value((found / given) ** 2 * own, own)
+        pairs.append(
+            Pair(
+                place=place,
+                found=found,
+                others=others,
+                among=min(1.0, among * tests),
+                beside_stated=min(1.0, alone * tests),
+            )
+        )
+    return pairs
+
+
+def _chance_of_checks(document: Document) -> float | None:
+    """Return the probability of the check points: of all together, and of their rms in plan and in height."""
+    check = document.get("precision", {}).get("check")
+    if not check:
+        return None
+    chances: Sequence[float] = [
+        p for p in (*(check[part]["p"] for part in PARTS), *(test["p"] for test in check["tests"])) if p is not None
+    ]
+    return min(1.0, min(chances) * len(chances)) if chances else None
+
+
+Tests = Mapping[str, float]  # probabilities by chance
+PARTS = ("plan", "height")
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 
 PAIR_RATIO = 1.5  # of a pair's sigma0, or of image residuals, to that of the others, or to what is stated
@@ -25,7 +118,6 @@ PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 POOR_CONTROL = 5.0  # rms of the control's residuals in standard deviations; a long strip bends by that much
 MANY_REJECTED, MANY_OF_PHOTO = 0.05, 0.2  # share of the points in pairs, of those of a photo
 SMALLEST_PROBABILITY = 0.001  # probability that is written as a number
-PARTS, TERMS = ("plan", "height"), ("twist", "bending")
 AREAS = {"plan": "ellipse", "height": "interval"}
 WRONG_CONTROL = {"control-rejected", "control-doubtful"}  # notes on control points that a finding may have named
 BARE_ENDS = {"P501", "P503"}  # findings on control that leaves an end out
@@ -34,7 +126,7 @@ NAMED = 3  # pairs, photos, findings or notes of one kind that are told; the giv
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
-    tests = own_tests.probabilities(document)
+    tests = probabilities(document)
     errors, sigma0 = list(_findings(document, "error")), list(_sigma0(document, tests))
     failed = [*_tolerances(document), *(errors or (sigma0 if _hopeless(document) else ()))]
     lost, others = _warnings(document)
@@ -45,8 +137,6 @@ def verdict_of(document: Document) -> Document:
         *(
             () if errors else (each for each in _numbers(document, tests) if each not in failed)
         ),  # of data that contradict themselves as a whole they say the same
-        *_common_deformation(document, in_metres=not errors),
-        *(() if errors else _deformed(document)),
         *_rejected(document),
         *_kinds(document, others, "note"),
     ]
@@ -231,20 +321,20 @@ def _checks(document: Document, tests: Tests) -> Iterator[str]:
         ratio = document["summary"]["check"]["normalised"]
         if ratio is not None and ratio > POOR_CONTROL:
             yield f"the check points are {ratio:.1f} times farther off than expected from the precision of one model"
-    elif tests.get(own_tests.CHECKS, 1.0) < _unseen_level(document):
-        yield _contradiction("the check points", document, check, "rms", tests[own_tests.CHECKS])
+    elif tests.get(CHECKS, 1.0) < _unseen_level(document):
+        yield _contradiction("the check points", document, check, "rms", tests[CHECKS])
 
 
 def _cross_validation(document: Document, tests: Tests) -> Iterator[str]:
     """Say when control that was left out contradicts the standard deviations of the points."""
-    if tests.get(own_tests.LEFT_OUT, 1.0) < _unseen_level(document):
+    if tests.get(LEFT_OUT, 1.0) < _unseen_level(document):
         found = document["cross_validation"]
-        yield _contradiction("control points left out in turn", document, found, "ratio", tests[own_tests.LEFT_OUT])
+        yield _contradiction("control points left out in turn", document, found, "ratio", tests[LEFT_OUT])
 
 
 def _agreement(document: Document, tests: Tests) -> str:
     """Say how far what took no part agrees with the standard deviations, where it does not contradict them."""
-    who = {own_tests.CHECKS: "the check points", own_tests.LEFT_OUT: "control points left out in turn"}
+    who = {CHECKS: "the check points", LEFT_OUT: "control points left out in turn"}
     said = []
     for name, subject in who.items():
         if (p := tests.get(name)) is not None and p >= _unseen_level(document):
@@ -280,13 +370,13 @@ def _known_cause(document: Document) -> str:
 
 
 def _sigma0(document: Document, tests: Tests) -> Iterator[str]:
-    summary, ratio = document["summary"], own_tests.sigma0_ratio(document)
-    if tests[own_tests.SIGMA0] < TEST_LEVEL:
+    summary, ratio = document["summary"], sigma0_ratio(document)
+    if tests[SIGMA0] < TEST_LEVEL:
         kind = "model" if summary.get("model_scale") else "image"
         times = f"{ratio:.1f}" if ratio > PAIR_RATIO else f"{ratio:.2f}"
         yield (
             f"the {kind} coordinates are {times} times worse than stated: sigma0 {summary['sigma0_um']:.1f} µm, "
-            f"stated {own_tests.stated(document):.1f} µm"
+            f"stated {stated(document):.1f} µm"
         )
 
 
@@ -294,18 +384,18 @@ def _hopeless(document: Document) -> bool:
     """Whether observations are as far off on the average as the largest of so many good ones: nothing holds then."""
     redundancy = document["summary"]["redundancy"]
     largest = normal_quantile(1 - SECOND_LOOK / (2 * max(redundancy, 1)))
-    return redundancy > 0 and own_tests.sigma0_ratio(document) > largest
+    return redundancy > 0 and sigma0_ratio(document) > largest
 
 
 def _pairs(document: Document, tests: Tests) -> Iterator[str]:
     """Name the pairs that are worse than the others, or than stated, by more than chance; a bundle needs none."""
     if "bundle" in document:
         return
-    given = own_tests.stated(document)
-    quiet = tests[own_tests.SIGMA0] < TEST_LEVEL  # said of the whole project already
+    given = stated(document)
+    quiet = tests[SIGMA0] < TEST_LEVEL  # said of the whole project already
     odd = [
         pair
-        for pair in own_tests.pairs(document)
+        for pair in pairs(document)
         if (pair.among < TEST_LEVEL and pair.found > PAIR_RATIO * pair.others)
         or (not quiet and pair.beside_stated < TEST_LEVEL and pair.found > PAIR_RATIO * given)
     ]
@@ -321,31 +411,6 @@ def _pairs(document: Document, tests: Tests) -> Iterator[str]:
     yield from _more(len(odd), "pair")
 
 
-def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]:
-    """Name what all models have in common; in data that contradict themselves metres mean nothing."""
-    for name, common in document.get("common_deformation", {}).items():
-        if common["p"] is not None and 2 * len(TERMS) * common["p"] < TEST_LEVEL:
-            size = f" {common['at_corner_m']:+.3f} m at a corner against the middle in the mean," if in_metres else ""
-            yield (
-                f"{common['models']} models are deformed alike ({name}):{size} t = {common['t']:.1f}; a lens, the film "
-                "or the principal distance"
-            )
-
-
-def _deformed(document: Document) -> Iterator[str]:
-    """Name models that are bent or twisted beyond chance."""
-    odd = [row for row in document.get("deformations", []) if 2 * row["p"] < TEST_LEVEL]
-    odd.sort(key=lambda row: -max(abs(row[f"{name}_at_corner_m"]) for name in TERMS))
-    for row in odd[:NAMED]:
-        name = max(TERMS, key=lambda name: abs(row[f"{name}_t"]))
-        size, t = row[f"{name}_at_corner_m"], row[f"{name}_t"]
-        yield (
-            f"the model of photos {row['left']} and {row['right']} is deformed ({name}): {size:.3f} m at a corner "
-            f"against the middle, t = {t:.1f}"
-        )
-    yield from _more(len(odd), "model")
-
-
 def _more(number: int, one: str, kind: str = "") -> Iterator[str]:
     if number > NAMED:
         yield f"{counted(number - NAMED, f'more {one}')}{kind} like these"
@@ -353,9 +418,9 @@ def _more(number: int, one: str, kind: str = "") -> Iterator[str]:
 
 def _photos(document: Document, tests: Tests) -> Iterator[str]:
     """Weigh all image residuals; name photos of large ones, then those that lost much, as by a shift of all points."""
-    whole, given = document["summary"]["image_rms_um"], own_tests.stated(document)
-    ratio = own_tests.residuals_ratio(document)
-    if ratio > PAIR_RATIO and tests[own_tests.RESIDUALS] < TEST_LEVEL <= tests[own_tests.SIGMA0]:
+    whole, given = document["summary"]["image_rms_um"], stated(document)
+    ratio = residuals_ratio(document)
+    if ratio > PAIR_RATIO and tests[RESIDUALS] < TEST_LEVEL <= tests[SIGMA0]:
         text = f"rms {whole:.1f} µm, stated {given:.1f} µm"
         yield f"the image residuals under the final orientation are {ratio:.1f} times as large as stated: {text}"
     rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row["readmitted"]}

@@ -329,6 +329,7 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
     )
     heights = {
         "c_um": "What the elements add to the x parallax, c of eq. 10.9, µm",
+        "py_um": "y parallaxes that they leave, µm",
         "raised_z_m": "Height errors before levelling, dZ, m",
         "left_z_m": "Height errors that the absolute orientation leaves, m",
         "left_x_m": "Errors along the flight that it leaves, m",
@@ -341,10 +342,17 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Iterator[Rows]
         (
             Field("x_mm", "mm 0"),
             Field("y_mm", "mm 0", "y \\ x"),
-            Field("c_um", "um +1", heights["c_um"]),
+            *(Field(key, "um +1", heights[key]) for key in ("c_um", "py_um")),
             *(Field(key, "m +3", heights.get(key), shown=key in heights) for key in keys),
         ),
-        by_columns(places[:, 0].tolist(), places[:, 1], bent.c * MICROMETRES, bent.raised * unit, bent.left * unit),
+        by_columns(
+            places[:, 0].tolist(),
+            places[:, 1],
+            bent.c * MICROMETRES,
+            bent.parallax * MICROMETRES,
+            bent.raised * unit,
+            bent.left * unit,
+        ),
         across="x_mm",
         tables=tuple(heights),
     )

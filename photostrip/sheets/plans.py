@@ -275,9 +275,10 @@ def _shares(outcome: ScreeningOutcome, key: str) -> Rows:
             for method, name in counted_by
         ]
         rows.append((value * factor, errors, *shares))
-    columns = (Field("", "percent 1", *each) for each in heads)
+    columns = (Field(f"{name}_{below}_percent".replace("__", "_"), "percent 1", name, below) for name, below in heads)
     title = f"Found, % of the errors of a {key}"
-    return Rows("", title, (Field("", "ratio g4", head), Field("", "count", "errors"), *columns), rows)
+    first = Field("zone" if key == "zone" else "size_um", "ratio g4", head)
+    return Rows(f"by_{key}", title, (first, Field("errors", "count"), *columns), rows)
 
 
 def _effects(outcome: ScreeningOutcome, sizes: Sequence[float]) -> Rows:

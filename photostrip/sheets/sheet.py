@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photostrip.formats.output.csv_text import to_csv
+from photostrip.arrays import Floats
+from photostrip.formats.result_files import to_csv
 from photostrip.notes import Document
 from photostrip.report.page.layout import USUAL, to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import Cell, Field, tabulated, with_unit, written
 
+Filled = tuple[Field, Any]  # a column with its values; what is no sequence of them stands in every row
 MORE_DECIMALS, MORE_DIGITS = 3, 4  # of JSON and CSV, that are not printed
 
 
@@ -176,7 +178,7 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
     """Return sections as a file holds them: ``text`` so wide, ``md``, ``html``, or their document as ``json``."""
     match form:
         case "json":
-            from photostrip.formats.output.result_json import to_json
+            from photostrip.formats.result_json import to_json
 
             return to_json(document)
         case "html":
@@ -189,10 +191,34 @@ def rendered(form: str, title: str, sections: Iterable[Section], document: Docum
     return to_text(title, sections, width or USUAL)
 
 
-def listed(key: str, title: str, columns: Sequence[Field], objects: Iterable[Any], **more: Any) -> Rows:  # noqa: ANN401 (of rows)
-    """Return a table with a row for each object, in which each column knows what stands in it."""
-    values = [attrgetter(each.of or each.key) if isinstance(each.of, str) else each.of for each in columns]
-    return Rows(key, title, columns, [[value(each) for value in values] for each in objects], **more)
+def same(**values: Any) -> list[Filled]:  # noqa: ANN401 (whatever stands in a cell)
+    """Return columns that stand in JSON and CSV alone, with the same value in every row."""
+    return [(Field(key, shown=False), value) for key, value in values.items()]
+
+
+def filled(columns: Sequence[Field], rows: Floats | Sequence[Any]) -> list[Filled]:
+    """Return columns with the values of an array (n, k), or of n rows."""
+    return [(column, [row[number] for row in rows]) for number, column in enumerate(columns)]
+
+
+def taken(columns: Sequence[Field], objects: Iterable[Any]) -> list[Filled]:
+    """Return columns with what they name of each object."""
+    named = [(each, attrgetter(each.of or each.key) if isinstance(each.of, str) else each.of) for each in columns]
+    rows = list(objects)
+    return [(column, [value(each) for each in rows]) for column, value in named]
+
+
+def table(key: str, title: str, columns: Sequence[Filled], **more: Any) -> Rows:  # noqa: ANN401 (of rows)
+    """Return a table of columns with their values; where none has a list of them it is a single row."""
+    several = [isinstance(values, list | tuple | np.ndarray) and not isinstance(values, Cell) for _, values in columns]
+    count = next((len(values) for (_, values), many in zip(columns, several, strict=True) if many), 1)
+    lists = [values if many else [values] * count for (_, values), many in zip(columns, several, strict=True)]
+    return Rows(key, title, [column for column, _ in columns], list(zip(*lists, strict=True)), **more)
+
+
+def listed(key: str, title: str, columns: Sequence[Field], objects: Iterable[Any], **more: Any) -> Rows:  # noqa: ANN401
+    """Return a table with a row for each object."""
+    return table(key, title, taken(columns, objects), **more)
 
 
 def by_columns(ids: Iterable[Any], *columns: ArrayLike) -> list[tuple[Any, ...]]:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import compress, pairwise
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.geometry.similarity import Similarity, pair_scales
+from photostrip.geometry.similarity import pair_scales
 from photostrip.notes import counted
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.report.page.parts import Facts, Part, Words
+from photostrip.report.page.parts import Facts, Words
 from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
-from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden
+from photostrip.sheets.sheet import Fact, Filled, Rows, Sheet, filled, hidden, same, table, taken
 from photostrip.strip import absolute_orientation
 from photostrip.strip.formed_strip import FirstPhoto, base_angles, base_frames, intersect_models
 from photostrip.strip.pair_screening import stages, tested
@@ -31,7 +31,7 @@ FOUR_BANDS = "control at four distances along the strip"
 PAIRED = 15  # control points whose 105 distances can still be read
 PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")
 TURNS, TURN_HEADS = ("alpha", "omega", "kappa"), ("α", "ω", "κ")
-SIMILARITY, SIMILARITY_HEADS = ("xi", "eta", "theta"), ("ξ", "η", "θ")
+END, NOTHING = Cell("end", None), Cell("", None)
 TESTS = {"parallax": "|q|, mm,", "grubbs": "Grubbs' G", "tau": "tau"}
 SYMBOLS = {
     "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
@@ -183,7 +183,7 @@ def trace_sheet(result: Result) -> Sheet:
     departures = [] if result.model_strips else departures_of(result)
     tables = [symbols, Rows("departures", "Where this run departs from the textbook", columns, departures)]
     for strip in result.strips:
-        if strip.model_stages is None:
+        if not strip.is_of_models:
             tables += [*_pairs(result, strip, unit), *_chain(strip, unit), *_scale_transfer(result, strip)]
         tables += [*_absolute(result, strip, unit), *_polynomial(result, strip)]
     facts = [Fact("name", result.inputs.name), Fact("angles", unit), Fact("symbols", SYMBOLS)]
@@ -194,13 +194,12 @@ def _greek(keys: Sequence[str], heads: Sequence[str], form: str, rank: int = 0) 
     return tuple(Field(key, form, head, rank=rank) for key, head in zip(keys, heads, strict=True))
 
 
-def _used(used: Any) -> Cell:  # noqa: ANN401 (a truth value, of numpy or not)
-    return Cell("" if used else "not used", bool(used))
+def _used(used: Iterable[Any]) -> Filled:
+    return Field("used", head=""), [Cell("" if each else "not used", bool(each)) for each in used]
 
 
-def _turned(rotation: Floats, factor: float) -> list[float]:
-    angles: list[float] = (alpha_omega_kappa(rotation).ravel() * factor).tolist()
-    return angles
+def _turned(rotations: Floats, factor: float) -> Floats:
+    return alpha_omega_kappa(rotations) * factor
 
 
 def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
@@ -208,59 +207,45 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     photos, orientation, formed = strip.strip.photos, strip.of_photos.orientation, strip.of_photos.formed
     factor, ids = PER_RADIAN[unit], result.refined.observations.point_ids
     bases, rotations = orientation.relative
-    who = hidden("strip", "left", "right")
-    own = ("bx", "by", "bz"), ("tau", "nu", *TURNS)
     for number, rounds in enumerate(pair_rounds(result, strip)):
-        names = (strip.strip.id, photos[number], photos[number + 1])
-        title = f"Relative orientation of {names[1]} – {names[2]}"
+        left, right = photos[number : number + 2]
+        who = same(strip=strip.strip.id, left=left, right=right)
         for count, each in enumerate(rounds, 1):
-            yield _round(names, each, count, unit, title if count == 1 else "")
-        yield Rows(
-            "pair_rejected",
-            "",
-            (
-                *who,
-                Field("point", head="rejected"),
-                Field("test"),
-                *fields("value limit", "ratio g4"),
-                Field("q", "mm 4"),
-                Field("readmitted", head=""),
-            ),
-            [
-                (
-                    *names,
-                    ids[orientation.point[each.row]],
-                    each.test,
-                    each.value,
-                    each.limit,
-                    each.worst,
-                    Cell("taken back" if each.readmitted else "", bool(each.readmitted)),
-                )
-                for each in strip.of_photos.rejections
-                if orientation.pairs.pair[each.row] == number
-            ],
+            yield _round(who, each, count, unit, f"Relative orientation of {left} – {right}" if count == 1 else "")
+        rejected = [each for each in strip.of_photos.rejections if orientation.pairs.pair[each.row] == number]
+        columns = (
+            Field("point", head="rejected", of=lambda each: ids[orientation.point[each.row]]),
+            Field("test"),
+            *fields("value limit", "ratio g4"),
+            Field("q", "mm 4", of="worst"),
+            Field("readmitted", head="", of=lambda at: Cell("taken back" if at.readmitted else "", at.readmitted)),
         )
-        yield from _largest(result, strip, number, names)
-        base = (bases[number] * formed.first.base).tolist()
-        angles = [*(np.array(base_angles(bases[number])) * factor).tolist(), *_turned(rotations[number], factor)]
-        told = ", ".join(f"{name} {value:z.6f}" for name, value in zip(own[0], base, strict=True))
+        yield table("pair_rejected", "", [*who, *taken(columns, rejected)])
+        yield from _largest(result, strip, number, who)
+        base = bases[number] * formed.first.base
+        angles = [*np.array(base_angles(bases[number])) * factor, *_turned(rotations[number], factor).ravel()]
+        told = ", ".join(f"{name} {value:z.6f}" for name, value in zip(("bx", "by", "bz"), base, strict=True))
         turns = zip(("τ", "ν", *TURN_HEADS), angles, strict=True)
         told += f"; {', '.join(f'{name} {value:z.6f}' for name, value in turns)} {unit}."
         sigma0 = orientation.sigma0[number] * 1000
-        yield Rows(
+        keys = hidden(*ELEMENTS, "bx", "by", "bz", "tau", "nu", *TURNS, form=f"{unit} 6")
+        yield table(
             "pairs",
             "",
-            (*who, *hidden("sigma0_um", form="um 2"), *hidden(*ELEMENTS, *own[0], *own[1], form=f"{unit} 6")),
-            [(*names, sigma0, *(orientation.elements[number] * factor), *base, *angles)],
+            [
+                *who,
+                (Field("sigma0_um", "um 2", shown=False), sigma0),
+                *filled(keys, [[*orientation.elements[number] * factor, *base, *angles]]),
+            ],
             above=(
                 f"In the system of the left photo: {told}",
                 f"σ0 of an image coordinate: {written(sigma0, 'um 2')} µm. The points, eq. 137-138:",
             ),
         )
-        yield _points(result, strip, number, names)
+        yield _points(result, strip, number, who)
 
 
-def _largest(result: Result, strip: StripResult, number: int, names: tuple[str, ...]) -> Iterator[Rows]:
+def _largest(result: Result, strip: StripResult, number: int, who: Sequence[Filled]) -> Iterator[Rows]:
     """Give the largest value of each test of single residuals that is left in a pair, beside its limit."""
     orientation, ids = strip.of_photos.orientation, result.refined.observations.point_ids
     rows = orientation.pairs.rows_of(np.array([number]))
@@ -268,97 +253,78 @@ def _largest(result: Result, strip: StripResult, number: int, names: tuple[str, 
     for test, bound in stages(result.settings.relative, strip.of_photos.sigma):
         value, limit, _ = (each[rows] for each in tested(orientation, test, bound))
         worst = int(np.argmax(np.where(orientation.used[rows], value, -np.inf)))
-        tests.append((*names, test, ids[orientation.point[rows[worst]]], value[worst], limit[worst]))
-    said = [f"{TESTS[test]} {value:.4g} at {point}, limit {limit:.4g}" for *_, test, point, value, limit in tests]
-    columns = (*hidden("strip", "left", "right", "test", "point"), *hidden("value", "limit", form="ratio g5"))
-    yield Rows("pair_tests", "", columns, tests, above=[f"What is left: {'; '.join(said)}."] if said else [])
+        tests.append((test, ids[orientation.point[rows[worst]]], value[worst], limit[worst]))
+    said = [f"{TESTS[test]} {value:.4g} at {point}, limit {limit:.4g}" for test, point, value, limit in tests]
+    columns = [*who, *filled((*hidden("test", "point"), *hidden("value", "limit", form="ratio g5")), tests)]
+    yield table("pair_tests", "", columns, above=[f"What is left: {'; '.join(said)}."] if said else [])
 
 
-def _round(names: tuple[str, ...], each: PairRound, count: int, unit: str, title: str) -> Rows:
+def _round(who: Sequence[Filled], each: PairRound, count: int, unit: str, title: str) -> Rows:
     """Give elements before each step and what is added, in the end the elements found."""
     factor, which = PER_RADIAN[unit], "all points" if count == 1 else "without the rejected points"
-    rows: list[tuple[Any, ...]] = [
-        (*names, count, each.points, number, step.squares, *(step.elements * factor), *(step.step * factor))
-        for number, step in enumerate(each.steps, 1)
+    added = [f"d_{name}" for name in ELEMENTS], [f"d{name}" for name in PRIMED]
+    columns = [
+        *who,
+        *same(round=count, points=each.points),
+        (Field("iteration", "count", "step"), [*range(1, len(each.steps) + 1), END]),
+        (Field("[wqq]", "mm² e4"), [*(step.squares for step in each.steps), NOTHING]),
+        *filled(
+            _greek(ELEMENTS, PRIMED, f"{unit} 6"),
+            np.array([*(step.elements for step in each.steps), each.end]) * factor,
+        ),
+        *filled(
+            _greek(*added, f"{unit} e1", rank=1),
+            [*(step.step * factor for step in each.steps), [NOTHING] * len(ELEMENTS)],
+        ),
     ]
-    nothing = Cell("", None)
-    rows.append(
-        (*names, count, each.points, Cell("end", None), nothing, *(each.end * factor), *[nothing] * len(ELEMENTS))
-    )
-    columns = (
-        *hidden("strip", "left", "right", "round", "points"),
-        Field("iteration", "count", "step"),
-        Field("[wqq]", "mm² e4"),
-        *_greek(ELEMENTS, PRIMED, f"{unit} 6"),
-        *_greek([f"d_{name}" for name in ELEMENTS], [f"d{name}" for name in PRIMED], f"{unit} e1", rank=1),
-    )
     above = [Words(f"Round {count}, {which}: {counted(each.points, 'point')}", "head")]
-    return Rows("pair_steps", title, columns, rows, above=above)
+    return table("pair_steps", title, columns, above=above)
 
 
-def _points(result: Result, strip: StripResult, number: int, names: tuple[str, ...]) -> Rows:
+def _points(result: Result, strip: StripResult, number: int, who: Sequence[Filled]) -> Rows:
     """Give image coordinates, parallax, ray factor and strip coordinates of the points of a pair."""
     orientation, ids = strip.of_photos.orientation, result.refined.observations.point_ids
-    formed = strip.of_photos.formed
-    rows = orientation.pairs.rows_of(np.array([number]))
+    formed, rows = strip.of_photos.formed, orientation.pairs.rows_of(np.array([number]))
     pairs = orientation.pairs.take(np.array([number]))
     left = FirstPhoto(formed.rotations[number], formed.first.base)
     model, _ = intersect_models(orientation.take(np.array([number])), left, left_ray=formed.left_ray)
-    image = np.column_stack([pairs.left, pairs.right, orientation.parallax[rows], model.ray_factor * left.base])
-    points = [ids[point] for point in orientation.point[rows]]
-    columns = (
-        *hidden("strip", "left", "right"),
-        Field("point"),
-        *fields("x1 y1 x2 y2 q", "mm 4"),
-        Field("N", "ratio 7"),
-        *fields("X Y Z", "strip 6"),
-        Field("used", head=""),
-    )
-    return Rows(
-        "pair_points",
-        "",
-        columns,
-        [
-            (*names, point, *values, *xyz, _used(weight > 0))
-            for point, values, xyz, weight in zip(points, image, formed.model_xyz[rows], pairs.weight, strict=True)
-        ],
-    )
+    image = np.column_stack([pairs.left, pairs.right, orientation.parallax[rows]])
+    columns = [
+        *who,
+        (Field("point"), [ids[point] for point in orientation.point[rows]]),
+        *filled(fields("x1 y1 x2 y2 q", "mm 4"), image),
+        (Field("N", "ratio 7"), model.ray_factor * left.base),
+        *filled(fields("X Y Z", "strip 6"), formed.model_xyz[rows]),
+        _used(pairs.weight > 0),
+    ]
+    return table("pair_points", "", columns)
 
 
 def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     """Give orientation and place of every photo in the strip, and the base that leads to it."""
     formed, factor, photos = strip.of_photos.formed, PER_RADIAN[unit], strip.strip.photos
-    rows: list[tuple[Any, ...]] = []
-    for number, photo in enumerate(photos):
-        base: list[Any] = [Cell("", None)] * 6
-        if number:
-            directions = (formed.base_direction[number - 1], formed.base_inclination[number - 1])
-            base = [*(each * factor for each in directions), *(formed.centers[number] - formed.centers[number - 1])]
-            base.append(formed.scale_factor[number - 1])
-        turn = formed.rotations[number]
-        rows.append((strip.strip.id, photo, *base, *_turned(turn, factor), *formed.centers[number], *turn.ravel()))
-    columns = (
-        *hidden("strip"),
-        Field("photo"),
-        *_greek(("tau", "nu"), ("τ", "ν"), f"{unit} 6"),
-        *fields("BX BY BZ", " 6"),
-        Field("k", " 7"),
-        *_greek(TURNS, TURN_HEADS, f"{unit} 6"),
-        *fields("Xs Ys Zs", " 6"),
-        *hidden(*MATRIX, form=" 8"),
-    )
-    title = f"Chain of strip {strip.strip.id}: orientation and base of every photo, eq. 125-136"
-    yield Rows("chain", title, columns, rows)
-    places = fields(" ".join(MATRIX), " 8")
-    matrices = [(photo, *turn.ravel()) for photo, turn in zip(photos, formed.rotations, strict=True)]
+    directions = np.column_stack([formed.base_direction, formed.base_inclination]) * factor
+    bases = np.column_stack([directions, np.diff(formed.centers, axis=0), formed.scale_factor])
+    who, photo = same(strip=strip.strip.id), (Field("photo"), list(photos))
+    places, turns = fields(" ".join(MATRIX), " 8"), formed.rotations.reshape(-1, 9)
+    before = (*_greek(("tau", "nu"), ("τ", "ν"), f"{unit} 6"), *fields("BX BY BZ", " 6"), Field("k", " 7"))
+    columns = [
+        *who,
+        photo,
+        *filled(before, [[NOTHING] * len(before), *bases]),
+        *filled(_greek(TURNS, TURN_HEADS, f"{unit} 6"), _turned(formed.rotations, factor)),
+        *filled(fields("Xs Ys Zs", " 6"), formed.centers),
+        *filled(hidden(*MATRIX, form=" 8"), turns),
+    ]
+    yield table("chain", f"Chain of strip {strip.strip.id}: orientation and base of every photo, eq. 125-136", columns)
     note = "A = A_taunu A(α2′, ω2′, κ2′), eq. 131-133, by rows."
-    yield Rows("", "", (Field("photo"), *places), matrices, note=note)
-    turns = base_frames(formed.rotations[:-1], strip.of_photos.orientation.elements).reshape(-1, 9)
-    frames = [(strip.strip.id, *names, *turn) for names, turn in zip(pairwise(photos), turns.tolist(), strict=True)]
+    yield table("", "", [photo, *filled(places, turns)], note=note)
+    frames = base_frames(formed.rotations[:-1], strip.of_photos.orientation.elements).reshape(-1, 9)
+    pair = [(Field("left"), list(photos[:-1])), (Field("right"), list(photos[1:]))]
     note = (
         "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; its first column is the base."
     )
-    yield Rows("base_frames", "", (*hidden("strip"), Field("left"), Field("right"), *places), frames, note=note)
+    yield table("base_frames", "", [*who, *pair, *filled(places, frames)], note=note)
 
 
 def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:
@@ -366,103 +332,73 @@ def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:
     formed, ids = strip.of_photos.formed, result.refined.observations.point_ids
     joined, form = formed.junctions, result.settings.formation.scale_transfer
     for number, factor in enumerate(joined.factor.tolist()):
-        who = (strip.strip.id, strip.strip.photos[number + 1])
-        rows = np.flatnonzero(joined.junction == number)
+        photo = strip.strip.photos[number + 1]
+        who, rows = same(strip=strip.strip.id, photo=photo), np.flatnonzero(joined.junction == number)
         center = formed.centers[number + 1]
         before = np.linalg.norm(formed.model_xyz[joined.before[rows]] - center, axis=1)
         after = np.linalg.norm(formed.model_xyz[joined.after[rows]] - center, axis=1) / formed.scale_factor[number + 1]
         k, ratios = factor * formed.scale_factor[number], joined.ratio[rows] * formed.scale_factor[number]
+        columns = [
+            *who,
+            (Field("point"), [ids[point] for point in joined.point[rows]]),
+            (Field("D", " 7"), before),
+            (Field("D'", " 7"), after),
+            (Field("k_t", " 7", "k_t"), ratios),
+            (Field("", " e1", "k_t - k"), ratios - k),
+            _used(joined.used[rows]),
+        ]
+        yield table("junction_points", f"Scale transfer at photo {photo}, eq. 139-141", columns)
         one = joined.spread[number] * k
-        columns = (
-            *hidden("strip", "photo"),
-            Field("point"),
-            *fields("D D'", " 7"),
-            Field("k_t", " 7", "k_t"),
-            Field("", " e1", "k_t - k"),
-            Field("used", head=""),
-        )
-        values = np.column_stack([before, after, ratios, ratios - k])
-        points = [ids[point] for point in joined.point[rows]]
-        yield Rows(
-            "junction_points",
-            f"Scale transfer at photo {who[1]}, eq. 139-141",
-            columns,
-            [
-                (*who, point, *row, _used(used))
-                for point, row, used in zip(points, values, joined.used[rows], strict=True)
-            ],
-        )
         spread = "" if np.isnan(one) else f"; standard deviation of one ratio {one:.1e}"
         said = f"k = {k:z.9f} ({form.replace('_', ' ')}){spread}."
-        columns = (*hidden("strip", "photo", "form"), *hidden("k", "sd_of_one", form=" 7"))
-        yield Rows("junctions", "", columns, [(*who, form, k, one)], above=[said])
+        found = [*who, *same(form=form), *filled(hidden("k", "sd_of_one", form=" 7"), [[k, one]])]
+        yield table("junctions", "", found, above=[said])
 
 
 def _absolute(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     similarity, frame, factor = strip.absolute.similarity, strip.intermediate, PER_RADIAN[unit]
-    points, name = strip.formed.xyz[strip.control_rows], strip.strip.id
+    points, who, sigma0 = strip.formed.xyz[strip.control_rows], same(strip=strip.strip.id), strip.absolute.sigma0
     moved = similarity(points)
     given = absolute_orientation.Targets(strip.control, result.frames, frame).of(moved)
     axes = "; ".join(" ".join(f"{value:z.9f}" for value in row) for row in frame.axes)
-    facts = Facts(
-        (
-            ("A0", f"{frame.azimuth * factor:z.6f} {unit}"),
-            ("origin, m", ", ".join(f"{value:z.4f}" for value in frame.origin)),
-            ("M, by rows", axes),
-        )
-    )
-    title = f"Absolute orientation of strip {name}, eq. 142-149"
-    keys = ("A0", "origin_x", "origin_y", "origin_z", *(f"M_{place}" for place in MATRIX))
-    first = (name, frame.azimuth * factor, *frame.origin, *frame.axes.ravel())
-    columns = (*hidden("strip"), *hidden(*keys, form=" 7"), *hidden("sigma0", form=" g4"))
-    yield Rows("absolute", title, columns, [(*first, strip.absolute.sigma0)], above=[facts])
+    origin = ", ".join(f"{value:z.4f}" for value in frame.origin)
+    facts = Facts((("A0", f"{frame.azimuth * factor:z.6f} {unit}"), ("origin, m", origin), ("M, by rows", axes)))
+    keys = hidden("A0", "origin_x", "origin_y", "origin_z", *(f"M_{place}" for place in MATRIX), form=" 7")
+    laid = filled(keys, [[frame.azimuth * factor, *frame.origin, *frame.axes.ravel()]])
+    columns = [*who, *laid, (Field("sigma0", " g4", shown=False), sigma0)]
+    yield table("absolute", f"Absolute orientation of strip {strip.strip.id}, eq. 142-149", columns, above=[facts])
     yield from _approximate(strip, points, given, similarity.scale)
-    nothing = Cell("", None)
-    steps: list[tuple[Any, ...]] = [
-        (name, number, step.squares, *_similarity(step.similarity, factor), *step.step)
-        for number, step in enumerate(similarity_steps(result, strip), 1)
+    steps = similarity_steps(result, strip)
+    states = [*(step.similarity for step in steps), similarity]
+    columns = [
+        *who,
+        (Field("iteration", "count", "step"), [*range(1, len(steps) + 1), END]),
+        (Field("[wvv]", " g6"), [*(step.squares for step in steps), NOTHING]),
+        (Field("s", " 7"), [each.scale for each in states]),
+        *filled(
+            _greek(("xi", "eta", "theta"), ("ξ", "η", "θ"), f"{unit} 6"),
+            _turned(np.array([each.rotation for each in states]), factor),
+        ),
+        *filled(fields("X0 Y0 Z0", "m 4"), np.array([each.shift for each in states])),
+        *filled(
+            (
+                *fields("dX0 dY0 dZ0", "m e1", rank=1),
+                *hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1"),
+            ),
+            [*(step.step for step in steps), [NOTHING] * 7],
+        ),
     ]
-    steps.append((name, Cell("end", None), nothing, *_similarity(similarity, factor), *[nothing] * 7))
-    sigma0 = strip.absolute.sigma0
-    yield Rows(
-        "similarity_steps",
-        "",
-        (
-            *hidden("strip"),
-            Field("iteration", "count", "step"),
-            Field("[wvv]", " g6"),
-            Field("s", " 7"),
-            *_greek(SIMILARITY, SIMILARITY_HEADS, f"{unit} 6"),
-            *fields("X0 Y0 Z0", "m 4"),
-            *fields("dX0 dY0 dZ0", "m e1", rank=1),
-            *hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1"),
-        ),
-        steps,
-        note="no redundancy" if np.isnan(sigma0) else f"σ0 = {sigma0:.4g}",
-    )
-    yield Rows(
-        "similarity_control",
-        "",
-        (
-            *hidden("strip"),
-            Field("point"),
-            Field("use"),
-            *fields("X Y Z", "strip 6"),
-            *fields("given_X given_Y given_Z", "m 3", "X Y Z", "given, m"),
-            *fields("vX vY vZ", "m 3"),
-        ),
-        [
-            (name, point, "".join(compress("xyz", use)), *row)
-            for point, use, row in zip(
-                strip.control.ids, strip.control.use.tolist(), np.hstack([points, given, moved - given]), strict=True
-            )
-        ],
-        note="v: strip minus given after the similarity, in the intermediate frame.",
-    )
-
-
-def _similarity(found: Similarity, factor: float) -> tuple[float, ...]:
-    return (found.scale, *_turned(found.rotation, factor), *found.shift)
+    yield table("similarity_steps", "", columns, note="no redundancy" if np.isnan(sigma0) else f"σ0 = {sigma0:.4g}")
+    columns = [
+        *who,
+        (Field("point"), list(strip.control.ids)),
+        (Field("use"), ["".join(compress("xyz", use)) for use in strip.control.use]),
+        *filled(fields("X Y Z", "strip 6"), points),
+        *filled(fields("given_X given_Y given_Z", "m 3", "X Y Z", "given, m"), given),
+        *filled(fields("vX vY vZ", "m 3"), moved - given),
+    ]
+    note = "v: strip minus given after the similarity, in the intermediate frame."
+    yield table("similarity_control", "", columns, note=note)
 
 
 def _approximate(strip: StripResult, points: Floats, given: Floats, scale: float) -> Iterator[Rows]:
@@ -470,82 +406,54 @@ def _approximate(strip: StripResult, points: Floats, given: Floats, scale: float
     full = np.flatnonzero(strip.control.use.all(axis=1))
     if len(full) < 2:
         return
-    found, name = pair_scales(points[full], given[full]), strip.strip.id
+    found, who = pair_scales(points[full], given[full]), same(strip=strip.strip.id)
     ids, centroid = [strip.control.ids[row] for row in full.tolist()], points[full].mean(axis=0)
-    pairs = [
-        (name, ids[first], ids[second], source, target, target / source)
-        for first, second, source, target in zip(
-            found.first.tolist(), found.second.tolist(), found.source.tolist(), found.target.tolist(), strict=True
-        )
+    few = slice(None) if len(full) <= PAIRED else slice(0)
+    columns = [
+        *who,
+        (Field("from"), [ids[row] for row in found.first[few]]),
+        (Field("to"), [ids[row] for row in found.second[few]]),
+        (Field("D", "strip 6"), found.source[few]),
+        (Field("DG", "m 3"), found.target[few]),
+        (Field("r", " g9"), (found.target / found.source)[few]),
     ]
-    columns = (Field("D", "strip 6"), Field("DG", "m 3"), Field("r", " g9"))
-    yield Rows(
-        "control_distances",
-        "",
-        (*hidden("strip"), Field("from"), Field("to"), *columns),
-        pairs if len(full) <= PAIRED else [],
-    )
+    yield table("control_distances", "", columns)
     r, t = found.mean, scale / found.mean
     center = ", ".join(f"{value:z.6f}" for value in centroid)
-    keys = (
-        *hidden("strip"),
-        *hidden("r", "t", form=" g9"),
-        *hidden("centroid_x", "centroid_y", "centroid_z", form=" 6"),
-    )
     said = f"r = {r:.9g}, t = s/r = {t:.9g}; centroid of the strip's control {center}."
-    yield Rows("approximate", "", keys, [(name, r, t, *centroid)], above=[said])
+    places = filled(hidden("centroid_x", "centroid_y", "centroid_z", form=" 6"), centroid[None])
+    yield table("approximate", "", [*who, *filled(hidden("r", "t", form=" g9"), [[r, t]]), *places], above=[said])
 
 
 def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
-    found, name = strip.polynomial, strip.strip.id
+    found, who = strip.polynomial, same(strip=strip.strip.id)
     if found is None:
         return
     xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
     corrected = found(xyz)
     given = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate).of(corrected)
-    who = hidden("strip")
-    yield Rows(
-        "polynomial_evidence",
-        f"Polynomials of strip {name}, eq. 150-151",
-        (
-            *who,
-            *hidden("found"),
-            Field("group"),
-            Field("degree", "count"),
-            Field("rms", "m 4"),
-            Field("left_out", "m 4"),
-            Field("F", " g4"),
-            Field("p", " g3"),
-            Field("taken", head=""),
-        ),
-        [
-            (
-                name,
-                found.degree,
-                each.group,
-                each.degree,
-                each.rms,
-                each.left_out,
-                each.f,
-                each.p,
-                Cell("taken" if each.accepted else "", bool(each.accepted)),
-            )
-            for each in found.evidence
-        ],
+    evidence = (
+        Field("group"),
+        Field("degree", "count"),
+        *fields("rms left_out", "m 4"),
+        Field("F", " g4", of="f"),
+        Field("p", " g3"),
+        Field("taken", head="", of=lambda each: Cell("taken" if each.accepted else "", bool(each.accepted))),
     )
+    tried = [*who, *same(found=found.degree), *taken(evidence, found.evidence)]
+    yield table("polynomial_evidence", f"Polynomials of strip {strip.strip.id}, eq. 150-151", tried)
     terms = [
-        (name, axis, *row, fit.sigma0)
+        (axis, *row, fit.sigma0)
         for axis, fit in zip("XYZ", found.axes, strict=True)
-        for row in zip(fit.terms, fit.coefficients.tolist(), fit.sigmas.tolist(), strict=True)
+        for row in zip(fit.terms, fit.coefficients, fit.sigmas, strict=True)
     ]
-    none: list[Part | str] = [] if terms else ["No term is taken."]
-    columns = (Field("axis", head="added to"), Field("term"), Field("coefficient", " e8"), Field("sigma", " e2", "±"))
-    yield Rows("polynomial_terms", "", (*who, *columns, *hidden("sigma0", form="m 3")), terms, above=none)
+    added = (Field("axis", head="added to"), Field("term"), Field("coefficient", " e8"), Field("sigma", " e2", "±"))
+    columns = [*who, *filled((*added, *hidden("sigma0", form="m 3")), terms)]
+    yield table("polynomial_terms", "", columns, above=[] if terms else ["No term is taken."])
     left = np.hstack([xyz[:, :2], given - xyz, corrected - given])
-    yield Rows(
-        "polynomial_control",
-        "",
-        (*who, Field("point"), *fields("X Y lX lY lZ vX vY vZ", "m 3")),
-        [(name, point, *row) for point, row in zip(strip.control.ids, left, strict=True)],
-        note="l: given minus strip; v: corrected minus given.",
-    )
+    columns = [
+        *who,
+        (Field("point"), list(strip.control.ids)),
+        *filled(fields("X Y lX lY lZ vX vY vZ", "m 3"), left),
+    ]
+    yield table("polynomial_control", "", columns, note="l: given minus strip; v: corrected minus given.")

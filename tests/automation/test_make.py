@@ -213,7 +213,7 @@ def snakefile() -> str:
 
 def test_the_snakefile_reads_what_the_depfile_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The one function of ours in it, without Snakemake: blanks in names, and the first run."""
-    from photostrip.formats.text.writing import make_rule
+    from photostrip.formats.files import make_rule
 
     monkeypatch.chdir(tmp_path)
     text = snakefile()

@@ -13,8 +13,8 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
-from photostrip.formats.output.result_json import read_result
-from photostrip.formats.text.source import digest
+from photostrip.formats.files import digest
+from photostrip.formats.result_json import read_result
 from tests.batch.projects import PHOTOS, Alone, run, tree, write_projects
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.batch import parsed_record
-from photostrip.formats.text import writing
-from photostrip.formats.text.source import digest
+from photostrip.formats import files
+from photostrip.formats.batch import parsed_record
+from photostrip.formats.files import digest
 from tests.batch.projects import run, started, tree, write_projects
 
 if TYPE_CHECKING:
@@ -90,12 +90,12 @@ def test_killed_at_every_third_step_of_writing(here: Path, monkeypatch: pytest.M
 
         return step
 
-    write, rename = writing._write, Path.replace
+    write, rename = files._write, Path.replace
     last, code = 0, -signal.SIGKILL
     while code:
         shutil.rmtree(here / "out", ignore_errors=True)
         with monkeypatch.context() as patch:
-            patch.setattr(writing, "_write", dying(write, last))
+            patch.setattr(files, "_write", dying(write, last))
             patch.setattr(Path, "replace", dying(rename, last))
             code = in_a_child(lambda: main(BATCH))
         check_nothing_half(here / "out", whole)

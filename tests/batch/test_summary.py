@@ -16,7 +16,7 @@ from photostrip.batch.evaluation import EXIT_CODES, failure, not_run
 from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
-from photostrip.formats.output.batch import parsed_record, summary_csv, summary_json
+from photostrip.formats.batch import parsed_record, summary_csv, summary_json
 from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, outcome_line
 from photostrip.report.page.layout import to_text
 from photostrip.report.page.progress import progress

@@ -14,8 +14,8 @@ import pytest
 from photostrip.batch.folder import opened
 from photostrip.cli.main import main
 from photostrip.errors import InputError
-from photostrip.formats.text import writing
-from photostrip.formats.text.writing import write_files
+from photostrip.formats import files
+from photostrip.formats.files import write_files
 from tests.batch.projects import run, tree
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def batch(folder: Path, *arguments: str, before: Callable[[], None] = as_anybody
 
 def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
     """Let the disk be full whenever something is written below a folder."""
-    write = writing._write
+    write = files._write
 
     def refused(path: Path, data: str | Iterable[str]) -> None:
         if full_for in str(path):
@@ -48,7 +48,7 @@ def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
         write(path, data)
 
-    monkeypatch.setattr(writing, "_write", refused)
+    monkeypatch.setattr(files, "_write", refused)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
+from photostrip.formats.result_json import read_result
 from photostrip.simulation.spec import Points
 from tests.loops import nonempty
 from tests.project.test_ids import ODD

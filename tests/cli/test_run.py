@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
-from photostrip.formats.text import writing
+from photostrip.formats import files
+from photostrip.formats.result_json import read_result
 from photostrip.report.sections.accuracy_report import NAMES, sections_of
 from photostrip.report.sections.overview import MOST_LINES
 from tests.loops import nonempty
@@ -211,14 +211,14 @@ def test_a_run_that_fails_leaves_the_earlier_result(
     out = tmp_path / "out"
     assert call("run", project, "-o", out)[0] == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    write = writing._write
+    write = files._write
 
     def full(self: Path, data: str | Iterable[str]) -> None:
         if "result.json" in self.name:
             raise OSError(28, "No space left on device", str(self))
         write(self, data)
 
-    monkeypatch.setattr(writing, "_write", full)
+    monkeypatch.setattr(files, "_write", full)
     code, _, err = call("run", project, "-o", out, "--set", "processing.adjustment=similarity")
     assert code == 2
     assert "No space left on device" in err
@@ -284,9 +284,9 @@ def test_verbose_prints_every_section(result: Path, call: Call) -> None:
 
 
 def test_what_a_killed_run_left_behind_is_removed_by_the_next(project: Path, tmp_path: Path) -> None:
-    dying = "import os; from photostrip.formats.text import writing; from photostrip.cli.main import main\n"
+    dying = "import os; from photostrip.formats import files; from photostrip.cli.main import main\n"
     dying += (
-        f"writing._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
+        f"files._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
     )
     done = subprocess.run([sys.executable, "-c", dying], cwd=tmp_path, capture_output=True, check=False)
     assert done.returncode == -9

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.formats.text import writing
+from photostrip.formats import files
 from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, sample
 from tests.project.test_faults import MARKS, ONE_FAULT
@@ -245,7 +245,7 @@ def test_a_full_disk_takes_the_same_form(
     def full(self: Path, _data: str) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(self))
 
-    monkeypatch.setattr(writing, "_write", full)
+    monkeypatch.setattr(files, "_write", full)
     code, out, err = call("run", path, "-o", tmp_path / "out", "--format", form)
     assert code == 2
     assert "no space left on device" in (out + err).lower()

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.result.table import rows_of
 from tests.loops import nonempty
 from tests.results import columns_of, rotation
@@ -171,25 +171,15 @@ def test_a_rejection_without_an_error_is_sound() -> None:
 
 
 EDITS: dict[str, tuple[Callable[[Document], object], str]] = {
-    "a list for a number": (lambda truth: put(truth, "points", "x", 0, [1.0]), "points.x[0]"),
-    "a text for a number": (lambda truth: put(truth, "points", "x", 0, "1.0"), "points.x[0]"),
-    "not a number": (lambda truth: put(truth, "points", "y", 2, float("nan")), "points.y[2]"),
     "a number without a square": (lambda truth: put(truth, "points", "y", 2, 1e300), "points.y[2]"),
-    "a list for an id": (lambda truth: put(truth, "points", "id", 0, ["a"]), "points.id[0]"),
     "no frame": (lambda truth: truth.pop("frame"), "frame"),
     "a list for the frame": (lambda truth: truth.update(frame=[{}]), "frame"),
     "no points": (lambda truth: truth.pop("points"), "points"),
     "no coordinates": (lambda truth: truth["points"].pop("x"), "points.x"),
-    "a text for points": (lambda truth: truth.update(points="all"), "points"),
-    "a column too short": (lambda truth: truth["photos"].update(r13=[1.0]), "photos.r13"),
     "no errors": (lambda truth: truth.update(errors=None), "errors"),
     "a text for a size": (
         lambda truth: truth.update(errors=columns_of([{**IMAGE, "size_um": "x"}])),
         "errors.size_um[0]",
-    ),
-    "half a character": (
-        lambda truth: truth.update(errors=columns_of([{**IMAGE, "point": "\ud800"}])),
-        "errors.point[0]",
     ),
     "another format": (lambda truth: truth.update(photostrip_truth=1), ""),
 }

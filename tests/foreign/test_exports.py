@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
+from photostrip.formats.result_json import read_result
 from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
 from tests.results import rotation

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
+from photostrip.formats.result_json import read_result
 from tests.foreign.converting import convert, refused
 from tests.foreign.historix_blocks import FILES, OPTIONS, copied, plane, simulated, with_ties
 

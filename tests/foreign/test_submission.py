@@ -14,7 +14,7 @@ from pyproj import CRS
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
+from photostrip.formats.result_json import read_result
 from tests.foreign.test_exports import (
     UTM,
     Ran,

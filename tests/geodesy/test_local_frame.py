@@ -8,12 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Transformer
 
-from photostrip.geodesy.local_frame import (
-    IntermediateFrame,
-    axes_matrix,
-    geocentric_from_geodetic,
-    strip_azimuth,
-)
+from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic, strip_azimuth
 
 WGS84 = (6378137.0, 6356752.314245179)
 MICROMETRE = 1e-6  # m

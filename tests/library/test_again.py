@@ -12,10 +12,10 @@ import pytest
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result, to_json
-from photostrip.formats.text.source import digest
+from photostrip.formats.files import digest
+from photostrip.formats.result_json import read_result, to_json
 from photostrip.library.comparison import compare_again
-from photostrip.result.statement.certificate import result_hash
+from photostrip.result.certificate import result_hash
 from tests.calls import Capture
 from tests.loops import nonempty
 from tests.results import by_rows, in_tables

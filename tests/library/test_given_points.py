@@ -68,8 +68,9 @@ class Sample:
             observations[axis][row] += size
         asked = {} if method == "auto" else {"adjustment": method}
         project = {**self.project, "processing": {**self.project.get("processing", {}), **asked, **keys}}
-        tables = {"observations.csv": observations, "control.csv": self.control}
-        return photostrip.run(project, tables=tables).document
+        project["observations"] = {**project["observations"], "file": observations}
+        project["control"] = [{**project["control"][0], "file": self.control}]
+        return photostrip.run(project).document
 
 
 def named(point: str, text: str) -> bool:

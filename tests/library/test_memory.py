@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import tracemalloc
 
-from photostrip.formats.output.result_files import beside_json
-from photostrip.formats.output.result_json import json_pieces
+from photostrip.formats.result_files import beside_json
+from photostrip.formats.result_json import json_pieces
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate

@@ -37,22 +37,16 @@ def columns(text: str) -> dict[str, list[Any]]:
     }
 
 
-def in_memory(simulation: photostrip.Simulation) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Give a simulated project as a mapping and its tables."""
-    project: dict[str, Any] = {
+def in_memory(simulation: photostrip.Simulation) -> dict[str, Any]:
+    """Give a simulated project as a mapping with its tables."""
+    images, given = (columns(simulation.files[f"{file}.csv"]) for file in ("observations", "control"))
+    return {
         "name": "memory",
         "cameras": {"film": {"principal_distance": np.float64(153.0), "format": np.array([230.0, 230.0])}},
         "strips": [{"id": "A", "camera": "film", "photos": simulation.truth["photos"]["id"]}],
-        "observations": {"file": "images", "unit": "mm", "sigma": 0.005},
-        "control": [
-            {"file": "given", "crs": "EPSG:32633", "axes": ["east", "north", "up"], "sigma": [0.05, 0.05, 0.08]}
-        ],
+        "observations": {"file": images, "unit": "mm", "sigma": 0.005},
+        "control": [{"file": given, "crs": "EPSG:32633", "axes": ["east", "north", "up"], "sigma": [0.05, 0.05, 0.08]}],
     }
-    tables = {
-        name: columns(simulation.files[f"{file}.csv"])
-        for name, file in (("images", "observations"), ("given", "control"))
-    }
-    return project, tables
 
 
 def test_a_project_says_what_it_holds() -> None:
@@ -91,36 +85,37 @@ def test_a_fault_of_an_override_names_it_as_it_was_written(overrides: dict[str, 
 
 
 def test_a_name_with_a_dot_is_one_key(simulation: photostrip.Simulation) -> None:
-    project, tables = in_memory(simulation)
+    project = in_memory(simulation)
     project["cameras"] = {"RC 30.1": project["cameras"]["film"]}
     project["strips"][0]["camera"] = "RC 30.1"
-    found = photostrip.load(project, tables=tables, cameras={"RC 30.1": {"principal_distance": 152.9}})
+    found = photostrip.load(project, cameras={"RC 30.1": {"principal_distance": 152.9}})
     assert found.loaded.inputs.strips[0].camera.principal_distance == 152.9
 
 
 @pytest.mark.slow
 def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulation) -> None:
-    project, tables = in_memory(simulation)
-    found = photostrip.run(project, tables=tables)
+    project = in_memory(simulation)
+    found = photostrip.run(project)
     by_files = photostrip.run(simulation.project)
     assert len(found.points) == len(by_files.points) > 20
     for axis in "xyz":
         np.testing.assert_array_equal(found.points[axis], by_files.points[axis])
     structured = np.array(
-        list(zip(*tables["images"].values(), strict=True)),
+        list(zip(*project["observations"]["file"].values(), strict=True)),
         [("photo", "U8"), ("point", "U8"), ("x", float), ("y", float)],
     )
-    again = photostrip.run(project, tables=tables | {"images": structured})
+    again = photostrip.run(project, observations=structured)
     assert again.document == found.document
 
 
 @pytest.mark.slow
 def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
     pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
-    project, tables = in_memory(simulation)
-    expected = photostrip.load(project, tables=tables).loaded.inputs.observations
-    for table in (pandas.DataFrame(tables["images"]), pyarrow.table(tables["images"])):
-        found = photostrip.load(project, tables=tables | {"images": table}).loaded.inputs.observations
+    project = in_memory(simulation)
+    expected = photostrip.load(project).loaded.inputs.observations
+    images = project["observations"].pop("file")
+    for table in (pandas.DataFrame(images), pyarrow.table(images)):
+        found = photostrip.load(project, observations=table).loaded.inputs.observations
         np.testing.assert_array_equal(found.xy, expected.xy)
         assert found.point_ids == expected.point_ids
 
@@ -141,11 +136,18 @@ def test_every_kind_of_input_may_come_from_memory(specification: dict[str, Any])
     project = yaml.safe_load(simulation.files["project.yaml"])
     tables = {name: columns(text) for name, text in simulation.files.items() if name.endswith(".csv")}
     overrides = {"processing": {"adjustment": "bundle"}} if "gnss" in specification else {}
-    found = photostrip.run(project, tables=tables, **overrides).document
+    found = photostrip.run(filled(project, tables), **overrides).document
     by_files = simulation.project.overridden(**overrides).run().document
     of_memory, of_files = found.pop("certificate"), by_files.pop("certificate")  # which has the bytes of the files
     assert found == by_files
     assert of_memory["result_sha256"] == of_files["result_sha256"]
+
+
+def filled(value: Any, tables: dict[str, Any]) -> Any:  # noqa: ANN401 (values of a project file)
+    """Put tables in place of the names of files."""
+    if isinstance(value, dict):
+        return {key: tables[each] if key == "file" else filled(each, tables) for key, each in value.items()}
+    return [filled(each, tables) for each in value] if isinstance(value, list) else value
 
 
 def spoilt(value: object) -> Callable[[list[Any]], Any]:
@@ -155,13 +157,13 @@ def spoilt(value: object) -> Callable[[list[Any]], Any]:
 @pytest.mark.parametrize(
     ("column", "change", "message"),
     [
-        ("x", spoilt(float("nan")), "images:5:13: x: no value is given"),
-        ("x", lambda column: np.array(spoilt(np.nan)(column)), "images:5:13: x: no value is given"),
-        ("x", lambda column: np.ma.masked_equal(column, column[3]), "images:5:13: x: no value is given"),
-        ("x", spoilt(float("inf")), "images:5:13: x: `inf` is not a measured value"),
-        ("point", spoilt(None), "images:5:6: point: the point has no id"),
-        ("point", spoilt(float("nan")), "images:5:6: point: the point has no id"),
-        ("point", spoilt("\udcff"), "images: is not valid Unicode text"),
+        ("x", spoilt(float("nan")), "observations:5:13: x: no value is given"),
+        ("x", lambda column: np.array(spoilt(np.nan)(column)), "observations:5:13: x: no value is given"),
+        ("x", lambda column: np.ma.masked_equal(column, column[3]), "observations:5:13: x: no value is given"),
+        ("x", spoilt(float("inf")), "observations:5:13: x: `inf` is not a measured value"),
+        ("point", spoilt(None), "observations:5:6: point: the point has no id"),
+        ("point", spoilt(float("nan")), "observations:5:6: point: the point has no id"),
+        ("point", spoilt("\udcff"), "observations: is not valid Unicode text"),
         ("point", lambda column: [*column[:4], column[3], *column[5:]], "is already measured on photo"),
         ("point", lambda column: column[:2], "columns of different shapes"),
     ],
@@ -169,24 +171,29 @@ def spoilt(value: object) -> Callable[[list[Any]], Any]:
 def test_what_is_not_there_or_twice_is_found_as_in_files(
     simulation: photostrip.Simulation, column: str, change: Callable[[list[Any]], Any], message: str
 ) -> None:
-    project, tables = in_memory(simulation)
-    images = tables["images"] | {column: change(tables["images"][column])}
+    project = in_memory(simulation)
+    images = project["observations"]["file"]
+    project["observations"]["file"] = images | {column: change(images[column])}
     with pytest.raises(photostrip.InputError, match=re.escape(message)):
-        photostrip.load(project, tables=tables | {"images": images})
+        photostrip.load(project)
 
 
-@pytest.mark.parametrize("table", [None, "photo,point", [[1, 2]], np.zeros((3, 4))])
+@pytest.mark.parametrize("table", [None, 7, np.zeros((3, 4))])
 def test_what_is_no_table_is_refused(simulation: photostrip.Simulation, table: object) -> None:
-    project, tables = in_memory(simulation)
-    with pytest.raises(photostrip.InputError, match=r"images: (is a \w+, no table|has columns of different shapes)"):
-        photostrip.load(project, tables=tables | {"images": table})
+    project = in_memory(simulation)
+    project["observations"]["file"] = table
+    with pytest.raises(
+        photostrip.InputError, match=r"observations: (is a \w+, no table|has columns of different shapes)"
+    ):
+        photostrip.load(project)
 
 
 def test_texts_may_be_bytes(simulation: photostrip.Simulation) -> None:
-    project, tables = in_memory(simulation)
-    as_bytes = tables["images"] | {"point": np.array(tables["images"]["point"]).astype("S12")}
-    found = photostrip.load(project, tables=tables | {"images": as_bytes}).loaded.inputs.observations
-    assert found.point_ids == photostrip.load(project, tables=tables).loaded.inputs.observations.point_ids
+    project = in_memory(simulation)
+    images = project["observations"]["file"]
+    expected = photostrip.load(project).loaded.inputs.observations.point_ids
+    project["observations"]["file"] = images | {"point": np.array(images["point"]).astype("S12")}
+    assert photostrip.load(project).loaded.inputs.observations.point_ids == expected
 
 
 @pytest.mark.parametrize(
@@ -203,28 +210,28 @@ def test_texts_may_be_bytes(simulation: photostrip.Simulation) -> None:
     ],
 )
 def test_a_fault_names_its_key(simulation: photostrip.Simulation, change: tuple[str, Any, Any], message: str) -> None:
-    project, tables = in_memory(simulation)
+    project = in_memory(simulation)
     block, key, value = change
     if key is None:
         project[block] = value
     else:
         project[block][key] = value
     with pytest.raises(photostrip.InputError) as refused:
-        photostrip.load(project, tables=tables)
+        photostrip.load(project)
     assert message in str(refused.value)
     assert {fault.line for fault in refused.value.faults} == {0}
 
 
 def test_a_fault_of_a_table_names_its_row(simulation: photostrip.Simulation) -> None:
-    project, tables = in_memory(simulation)
-    tables["images"]["x"][3] = "north"
-    with pytest.raises(photostrip.InputError, match="images:5"):
-        photostrip.load(project, tables=tables)
-    tables["images"]["x"] = [1.0]
+    project = in_memory(simulation)
+    project["observations"]["file"]["x"][3] = "north"
+    with pytest.raises(photostrip.InputError, match="observations:5"):
+        photostrip.load(project)
+    project["observations"]["file"]["x"] = [1.0]
     with pytest.raises(photostrip.InputError, match=r"columns of different shapes: photo \(\d+,\).*x \(1,\)"):
-        photostrip.load(project, tables=tables)
+        photostrip.load(project)
     with pytest.raises(photostrip.InputError, match="no columns"):
-        photostrip.load(project, tables=tables | {"images": {}})
+        photostrip.load({**project, "observations": {"file": {}, "unit": "mm"}})
 
 
 def test_a_check_raises_nothing(tmp_path: Path) -> None:
@@ -238,13 +245,17 @@ def test_a_check_raises_nothing(tmp_path: Path) -> None:
     assert photostrip.check(photostrip.load(SAMPLE), processing={"adjustment": "bundle"}).ok
     mapping = photostrip.check({"name": "x"})
     assert repr(mapping).splitlines()[1].startswith("error: project: strips: `strips` is missing")
+    frame = np.array([("1", "2")], [("photo", "U1"), ("point", "U1")])
     with pytest.raises(photostrip.InputError, match="tables in memory go with a project that is a mapping"):
-        photostrip.run(SAMPLE, tables={})
+        photostrip.run(SAMPLE, observations=frame)
+    with pytest.raises(photostrip.InputError, match="project: control: 2 tables are given for 1 of `control`"):
+        photostrip.load({"control": [{"crs": "local"}]}, control=[frame, frame])
 
 
 def test_a_refused_adjustment_carries_its_findings(simulation: photostrip.Simulation) -> None:
-    project, tables = in_memory(simulation)
-    tables["given"]["x"] = [-value for value in tables["given"]["x"]]
+    project = in_memory(simulation)
+    given = project["control"][0]["file"]
+    given["x"] = [-value for value in given["x"]]
     with pytest.raises((photostrip.InputError, photostrip.GeometryError)) as refused:
-        photostrip.run(project, tables=tables)
+        photostrip.run(project)
     assert [each.code for each in refused.value.findings] != []

@@ -14,12 +14,12 @@ pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 # What scripts of users rely on. A change here needs a line in CHANGELOG.md that says what to do instead.
 PARAMETERS = {
-    "check": ["project", "tables", "overrides"],
+    "check": ["project", "overrides"],
     "compare": ["result", "baseline", "tolerances"],
-    "load": ["project", "tables", "overrides"],
+    "load": ["project", "overrides"],
     "plan": ["kind", "specification", "overrides"],
     "read_result": ["path"],
-    "run": ["project", "tables", "overrides"],
+    "run": ["project", "overrides"],
     "simulate": ["specification", "overrides"],
 }
 MEMBERS = {
@@ -29,7 +29,7 @@ MEMBERS = {
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
         "accuracy", "computed", "control", "covariance_of", "crs", "document", "files", "findings",
-        "name", "notes", "pairs", "photos", "pictures", "points", "rejected", "report", "residuals",
+        "name", "notes", "pairs", "photos", "plot", "points", "rejected", "report", "residuals",
         "statement", "status", "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],

@@ -14,6 +14,7 @@ from pyproj import Transformer
 
 import photostrip
 from photostrip.cli.main import main
+from photostrip.report.pictures.result import pictures_of
 from photostrip.result.table import plain_of
 from tests.loops import nonempty
 from tests.source_tree import ROOT
@@ -318,3 +319,12 @@ def test_a_saved_result_is_read_again(result: photostrip.Result, tmp_path: Path)
 def test_the_trace_is_that_of_the_command(tmp_path: Path) -> None:
     assert main(["run", str(SAMPLE), "-q", "--trace", str(tmp_path / "trace.md")]) == 0
     assert photostrip.run(SAMPLE).trace("md") == (tmp_path / "trace.md").read_text(encoding="utf-8")
+
+
+def test_pictures_are_those_of_the_report(result: photostrip.Result) -> None:
+    picture = result.plot.residuals()
+    assert picture.file() in {each.file() for each in pictures_of(result.document)}
+    assert picture._repr_svg_().startswith("<svg")
+    assert {"plan", "precision_height", "check"} <= set(dir(result.plot))
+    with pytest.raises(AttributeError, match=r"has no picture 'resdiuals': plan, .*residuals"):
+        result.plot.resdiuals()

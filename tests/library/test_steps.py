@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -13,18 +12,19 @@ import pytest
 import photostrip
 from photostrip import steps
 from photostrip.camera import Camera, Distortion
-from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from tests.calls import Capture
+    from tests.calls import Call
+
+    Document = dict[str, Any]
 
 F = 153.0
 NOISE = {"image": {"sigma_um": 0}, "control": {"noise": [0, 0, 0]}}
@@ -116,7 +116,7 @@ def test_three_photos_make_a_strip(truth: Truth) -> None:
     assert np.abs(departures).max() < 1e-9
 
 
-def test_a_strip_is_formed_at_once(truth: Truth, tmp_path: Path, capsys: Capture) -> None:
+def test_a_strip_is_formed_at_once(truth: Truth, alone: Alone) -> None:
     seen = [(photo, name) for photo in range(3) for name in truth.common(photo)]
     ids = list(dict.fromkeys(name for _, name in seen))
     xy = np.array([truth.image(photo, [name])[0] for photo, name in seen])
@@ -134,19 +134,15 @@ def test_a_strip_is_formed_at_once(truth: Truth, tmp_path: Path, capsys: Capture
     assert found.models.max() == 2
     assert placed.sum() == len({*truth.common(0, 1), *truth.common(1, 2)})
 
-    images = tmp_path / "images.csv"
     lines = [f"{photo},{name},{x!r},{y!r}" for (photo, name), (x, y) in zip(seen, xy.tolist(), strict=True)]
-    images.write_text("\n".join(["photo,point,x,y", *lines]), encoding="utf-8")
-    assert call("strip", str(images), F153, "base=92", "--format", "json") == 0
-    out = json.loads(capsys.readouterr().out)
+    images = alone.write(["photo,point,x,y", *lines])
+    out = alone("strip", images, F153, "base=92")
     assert [row["point"] for row in out["points"]] == [name for name, here in zip(ids, placed, strict=True) if here]
-    np.testing.assert_allclose([[row[axis] for axis in "xyz"] for row in out["photos"]], found.centers, atol=6e-5)
+    np.testing.assert_allclose(axes(out["photos"], "xyz"), found.centers, atol=6e-5)
     assert out["values"][1] == {"name": "k 1-2", "value": pytest.approx(found.factors[1]), "unit": "", "sigma": None}
-    assert call("strip", str(images), F153, "--trace") == 0
-    assert f"{found.factors[1]:.7f}" in capsys.readouterr().out
-    images.write_text("\n".join(["photo,point,x,y", *lines, lines[0]]), encoding="utf-8")
-    assert call("strip", str(images), F153) == 2
-    assert "is already measured on photo 0" in capsys.readouterr().err
+    assert f"{found.factors[1]:.7f}" in alone.typed("strip", images, F153, "--trace")[1]
+    code, _, err = alone.typed("strip", alone.write(["photo,point,x,y", *lines, lines[0]]), F153)
+    assert (code, "is already measured on photo 0" in err) == (2, True)
 
 
 def test_a_photo_is_found_on_known_points(truth: Truth) -> None:
@@ -201,14 +197,13 @@ class Flown:
         pairs = zip(self.seen, self.xy.tolist(), strict=True)
         return ["photo,point,x,y", *(f"{photo},{name},{x!r},{y!r}" for (photo, name), (x, y) in pairs)]
 
-    def command(self, folder: Path) -> list[str]:
-        """Write images and control; give the command that adjusts them."""
-        (folder / "images.csv").write_text("\n".join(self.lines()), encoding="utf-8")
+    def command(self, alone: Alone) -> tuple[str, str, str, str]:
+        """Write images and control; give what adjusts them."""
         known = np.isfinite(self.given[:, 0])
         names = [name for name, here in zip(self.ids, known, strict=True) if here]
         ground = np.vstack([self.given[known], [9.0, 9.0, 9.0]])
-        control = table(folder / "control.csv", "point x_ground y_ground z_ground", [*names, "not seen"], ground)
-        return ["bundle", str(folder / "images.csv"), F153, f"control={control}"]
+        control = alone.table("point x_ground y_ground z_ground", [*names, "not seen"], ground, name="control.csv")
+        return "bundle", alone.write(self.lines(), "images.csv"), F153, f"control={control}"
 
 
 @pytest.fixture(scope="module")
@@ -232,11 +227,10 @@ def test_the_bundle_starts_from_the_strip(truth: Truth, flown: Flown) -> None:
         steps.bundle(flown.rays, F, ground=flown.given[:2])
 
 
-def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: Capture) -> None:
-    command, found = flown.command(tmp_path), steps.bundle(flown.rays, F, ground=flown.given)
-    assert call(*command, "--format", "json") == 0
-    out = capsys.readouterr().out
-    rows = {row["point"]: np.array(list(row.values())[1:], float) for row in json.loads(out)["points"]}
+def test_the_bundle_as_a_command(flown: Flown, alone: Alone) -> None:
+    command, found = flown.command(alone), steps.bundle(flown.rays, F, ground=flown.given)
+    out = alone(*command)
+    rows = {row["point"]: np.array(list(row.values())[1:], float) for row in out["points"]}
     assert list(rows) == [name for name, here in zip(flown.ids, flown.placed, strict=True) if here]
     expected = np.hstack([found.points, found.sigmas, found.points - flown.given])[flown.placed]
     np.testing.assert_allclose(np.array(list(rows.values())), expected, atol=6e-5)
@@ -245,22 +239,17 @@ def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: Capture) 
         "redundancy": found.redundancy,
         "iterations": found.iterations,
     }
-    assert [row["photo"] for row in json.loads(out)["photos"]] == ["0", "1", "2"]
-    tables, taken = traced(capsys, *command), flown.placed[flown.point]
+    assert [row["photo"] for row in out["photos"]] == ["0", "1", "2"]
+    tables, taken = traced(out), flown.placed[flown.point]
     left = np.column_stack([tables["rays"][axis] - tables["rays"][f"{axis}'"] for axis in "xy"])
     np.testing.assert_allclose(left, found.residuals[taken], atol=1e-9)
     squares = tables["steps_of_all_photos_and_points"]["[pvv]"]
     assert squares[-1] == pytest.approx(found.sigma0**2 * found.redundancy)
-    half = ["sigma_um=2.5", "control_sigma=0.025", "--format", "json"]
-    assert call(*command, *half) == 0
-    assert values(capsys.readouterr().out)["sigma0"] == pytest.approx(2 * found.sigma0)
-    free = steps.bundle(flown.rays, F, base=92.0)
-    assert call(*command[:3], "base=92", "--format", "json") == 0
-    out = capsys.readouterr().out
+    half = alone(*command, "sigma_um=2.5", "control_sigma=0.025")
+    assert values(half)["sigma0"] == pytest.approx(2 * found.sigma0)
+    free, out = steps.bundle(flown.rays, F, base=92.0), alone(*command[:3], "base=92")
     assert values(out)["redundancy"] == free.redundancy
-    np.testing.assert_allclose(
-        [[row[axis] for axis in "xyz"] for row in json.loads(out)["photos"]], free.centers, atol=6e-5
-    )
+    np.testing.assert_allclose(axes(out["photos"], "xyz"), free.centers, atol=6e-5)
 
 
 @pytest.mark.parametrize(
@@ -269,28 +258,17 @@ def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: Capture) 
         ("control.csv", ["point,x,y,z", "1,2,3,4"], 2, "control.csv:1: x_ground: there is no column"),
         ("control.csv", ["point,x_ground,y_ground,z_ground", "1,2,3,4"], 3, "fewer than three points"),
         ("images.csv", ["photo,point,x", "1,2,3"], 2, "images.csv:1: y: there is no column"),
-        (
-            "images.csv",
-            ["photo,point,x,y", "a,2,3,4", "b,2,3,4"],
-            3,
-            "relative orientation of photos a and b: 1 common point",
-        ),
+        ("images.csv", ["photo,point,x,y", "a,2,3,4", "b,2,3,4"], 3, "orientation of photos a and b: 1 common point"),
         ("images.csv", ["photo,point,x,y", "a,2,3,4"], 3, "a strip needs two photos"),
     ],
 )
 def test_a_bundle_that_cannot_be_is_refused(
-    flown: Flown,
-    tmp_path: Path,
-    capsys: Capture,
-    file: str,
-    lines: list[str],
-    code: int,
-    message: str,
+    flown: Flown, alone: Alone, file: str, lines: list[str], code: int, message: str
 ) -> None:
-    command = flown.command(tmp_path)
-    (tmp_path / file).write_text("\n".join(lines), encoding="utf-8")
-    assert call(*command) == code
-    assert message in capsys.readouterr().err
+    command = flown.command(alone)
+    alone.write(lines, file)
+    found, _, err = alone.typed(*command)
+    assert (found, message in err) == (code, True)
 
 
 @pytest.mark.parametrize(("kind", "redundancy"), [("affine", 2), ("conformal", 4)])
@@ -356,231 +334,216 @@ def test_what_determines_nothing_is_refused(call: Callable[[], object], message:
 # --------------------------------------------------------------------------------------------------- as commands
 
 
-def table(path: Path, head: str, ids: list[str], *columns: NDArray[np.float64]) -> str:
-    """Write a table of points; give its path."""
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(head.split())
-        writer.writerows([name, *row] for name, row in zip(ids, np.column_stack(columns).tolist(), strict=True))
-    return str(path)
-
-
 F153 = "principal_distance=153"
+PAIR = "point x_left y_left x_right y_right"
+ON_GROUND = "point x y z x_ground y_ground z_ground"
 
 
-def call(*arguments: str) -> int:
-    """Call a step; what has an equals sign in it is a key that is set."""
-    return main(["step", *(f"--set={each}" if "=" in each else each for each in arguments)])
+class Alone:
+    """Steps as commands; what has an equals sign in it is a key that is set."""
+
+    def __init__(self, call: Call, folder: Path) -> None:
+        self.call, self.folder = call, folder
+
+    def write(self, lines: list[str], name: str = "points.csv") -> str:
+        """Write a table; give its path."""
+        (self.folder / name).write_text("\n".join(lines), encoding="utf-8")
+        return str(self.folder / name)
+
+    def table(
+        self,
+        head: str,
+        ids: Sequence[str],
+        *columns: Sequence[Sequence[float]] | NDArray[np.float64],
+        name: str = "points.csv",
+    ) -> str:
+        """Write a table of points with all digits; give its path."""
+        rows = np.hstack([np.asarray(each, float) for each in columns]).tolist()
+        lines = [",".join([first, *map(repr, row)]) for first, row in zip(ids, rows, strict=True)]
+        return self.write([head.replace(" ", ","), *lines], name)
+
+    def typed(self, *arguments: str) -> tuple[int, str, str]:
+        return self.call("step", *(f"--set={each}" if "=" in each else each for each in arguments))
+
+    def __call__(self, *arguments: str) -> Document:
+        """Take a step that must succeed; give its answer with its trace."""
+        code, out, err = self.typed(*arguments, "--trace", "--format", "json")
+        assert (code, err) == (0, "")
+        document: Document = json.loads(out)
+        return document
 
 
-def values(out: str) -> dict[str, float]:
-    return {each["name"]: each["value"] for each in json.loads(out)["values"]}
+@pytest.fixture
+def alone(call: Call, tmp_path: Path) -> Alone:
+    return Alone(call, tmp_path)
 
 
-def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: Capture) -> None:
-    ids = truth.common(0, 1)
-    images = truth.image(0, ids), truth.image(1, ids)
-    pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, *images)
-    assert call("relative", pair, F153, "base=900", "unit=m", "--format", "json") == 0
-    out = capsys.readouterr().out
-    found, expected = values(out), steps.relative(*images, F, base=900.0)
-    assert found["kappa2"] == pytest.approx(np.degrees(expected.elements[4]), abs=1e-6)
-    assert found["by"] == pytest.approx(900 * expected.base[1])
-    turned = from_angles(np.radians([found[name] for name in ("omega", "phi", "kappa")]), "omega-phi-kappa")
-    np.testing.assert_allclose(turned, expected.rotation, atol=1e-9)
-    np.testing.assert_allclose([list(row.values())[2:] for row in json.loads(out)["points"]], expected.model, atol=6e-5)
-
-    model = table(
-        tmp_path / "control.csv", "point x y z x_ground y_ground z_ground", ids, expected.model, truth.xyz(ids)
-    )
-    assert call("absolute", model, "--format", "json") == 0
-    assert values(capsys.readouterr().out)["scale"] == pytest.approx(
-        steps.absolute(expected.model, truth.xyz(ids)).similarity.scale
-    )
-
-    photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, images[0], truth.xyz(ids))
-    assert call("resection", photo, F153, "--format", "json") == 0
-    oriented = values(capsys.readouterr().out)
-    assert [oriented[axis] for axis in "xyz"] == pytest.approx(truth.centers[0].tolist(), abs=1e-4)
-
-    marks = table(
-        tmp_path / "marks.csv",
-        "mark x y x_photo y_photo",
-        ["1", "2", "3", "4"],
-        np.eye(4)[:, :2] * 100,
-        np.eye(4)[:, :2] * 100 + 1,
-    )
-    assert call("interior", marks, "transform=conformal", "--format", "json") == 0
-    assert values(capsys.readouterr().out)["x: 1"] == pytest.approx(1.0)
-
-    points = table(tmp_path / "points.csv", "point x y", ids, images[0])
-    assert call("refine", points, F153, "principal_point=[0.5, -0.25]", "--format", "csv") == 0
-    rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
-    assert [float(row["dx"]) for row in rows] == [-500.0] * len(ids)
-
-    strip = table(
-        tmp_path / "strip.csv", "photo omega phi kappa", ["1", "2"], np.array([[1.0, 2.0, 30.0], [3.0, 2.0, 1.0]])
-    )
-    assert call("chain", strip, "--format", "json") == 0
-    handed = np.radians([list(row.values())[1:] for row in json.loads(capsys.readouterr().out)["points"]])
-    turns = [from_angles(np.radians(each), "omega-phi-kappa") for each in ([1.0, 2.0, 30.0], [3.0, 2.0, 1.0])]
-    np.testing.assert_allclose(from_angles(handed[1], "omega-phi-kappa"), turns[0] @ turns[1], atol=2e-8)
-
-    junction = table(
-        tmp_path / "junction.csv", "point x y z x_next y_next z_next", ids, expected.model, expected.model / 1.25
-    )
-    assert call("scale", junction, "--format", "json") == 0
-    assert values(capsys.readouterr().out) == {"k": pytest.approx(1.25), "rms departure": pytest.approx(0, abs=1e-6)}
-
-    bend = (2 + 3e-3 * expected.model[:, 0])[:, None]
-    control = table(tmp_path / "bend.csv", "point x y z misclosure", ids, expected.model, bend)
-    assert call("polynomial", control, "terms=[1, X]", "--format", "json") == 0
-    fitted = values(capsys.readouterr().out)
-    assert [fitted["1"], fitted["X"]] == pytest.approx([2, 3e-3])
-
-    base = ",".join(str(each) for each in truth.rotations[0].T @ (truth.centers[1] - truth.centers[0]))
-    angles = ",".join(str(found[name]) for name in ("omega", "phi", "kappa"))
-    given = (f"base=[{base}]", f"right=[{angles}]")
-    assert call("intersection", pair, F153, *given, "--format", "json") == 0
-    places = np.array([list(row.values())[1:4] for row in json.loads(capsys.readouterr().out)["points"]])
-    np.testing.assert_allclose(places @ truth.rotations[0].T + truth.centers[0], truth.xyz(ids), atol=2e-4)
+def values(answer: Document) -> dict[str, float]:
+    return {each["name"]: each["value"] for each in answer["values"]}
 
 
-def traced(capsys: Capture, *arguments: str) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Give the tables of the trace of a step: columns by name."""
-    assert call(*arguments, "--trace", "--format", "json") == 0
-    tables = {key: each for key, each in json.loads(capsys.readouterr().out).items() if key.startswith("trace_")}
+def axes(rows: list[Document], names: Sequence[str]) -> NDArray[np.float64]:
+    return np.array([[row[axis] for axis in names] for row in rows])
+
+
+def traced(answer: Document) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Give the tables of a trace: columns by name."""
     return {
         key.removeprefix("trace_"): {
             name: np.array([row[name] for row in rows], float) for name in rows[0] if name != "id"
         }
-        for key, rows in nonempty(tables.items())
+        for key, rows in nonempty(answer.items())
+        if key.startswith("trace_")
     }
 
 
-def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, capsys: Capture) -> None:
-    ids = truth.common(0, 1)
-    rng = np.random.default_rng(2)
+class Noisy(NamedTuple):
+    """Common points of two photos, with noise."""
+
+    ids: list[str]
+    left: NDArray[np.float64]
+    right: NDArray[np.float64]
+    xyz: NDArray[np.float64]
+
+
+@pytest.fixture
+def noisy(truth: Truth) -> Noisy:
+    ids, rng = truth.common(0, 1), np.random.default_rng(2)
     left, right = (truth.image(photo, ids) + rng.normal(0, 0.005, (len(ids), 2)) for photo in (0, 1))
-    pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, left, right)
-    found = steps.relative(left, right, F, base=920.0)
-    tables = traced(capsys, "relative", pair, F153, "base=920")
+    return Noisy(ids, left, right, truth.xyz(ids))
+
+
+def test_relative_orientation_as_a_command(noisy: Noisy, alone: Alone) -> None:
+    expected = steps.relative(noisy.left, noisy.right, F, base=920.0)
+    out = alone("relative", alone.table(PAIR, noisy.ids, noisy.left, noisy.right), F153, "base=920", "unit=m")
+    found, tables = values(out), traced(out)
+    assert found["by"] == pytest.approx(920 * expected.base[1])
+    turned = from_angles(np.radians([found[name] for name in ("omega", "phi", "kappa")]), "omega-phi-kappa")
+    np.testing.assert_allclose(turned, expected.rotation, atol=1e-9)
+    np.testing.assert_allclose(axes(out["points"], "xyz"), expected.model, atol=6e-5)
     before, added = tables["elements_before_each_step"], tables["what_the_step_adds"]
     for k, name in enumerate(("alpha1", "kappa1", "alpha2", "omega2", "kappa2")):
-        assert before[name][-1] + added[name][-1] == pytest.approx(np.degrees(found.elements[k]), abs=1e-9)
+        assert found[name] == pytest.approx(np.degrees(expected.elements[k]), abs=1e-6)
+        assert before[name][-1] + added[name][-1] == pytest.approx(np.degrees(expected.elements[k]), abs=1e-9)
         np.testing.assert_allclose(before[name][:-1] + added[name][:-1], before[name][1:], atol=1e-9)
-    assert before["[qq]"][-1] == pytest.approx((found.parallax**2).sum())
+    assert before["[qq]"][-1] == pytest.approx((expected.parallax**2).sum())
     (points,) = [each for title, each in tables.items() if title.startswith("points")]
-    np.testing.assert_allclose(points["y1h"] - points["y2h"], found.parallax, atol=1e-9)
-    np.testing.assert_allclose(points["N"] * points["x1h"], found.model[:, 0])
-    np.testing.assert_allclose((points["Y1"] + points["Y2"]) / 2, found.model[:, 1])
+    np.testing.assert_allclose(points["y1h"] - points["y2h"], expected.parallax, atol=1e-9)
+    np.testing.assert_allclose(points["N"] * points["x1h"], expected.model[:, 0])
+    np.testing.assert_allclose((points["Y1"] + points["Y2"]) / 2, expected.model[:, 1])
 
-    tables = traced(capsys, "intersection", pair, F153, "base=[900, 10, -20]", "right=[0.2, -0.1, 1.4]")
-    turned = from_angles(np.radians([0.2, -0.1, 1.4]), "omega-phi-kappa")
+
+def test_intersection_as_a_command(noisy: Noisy, alone: Alone) -> None:
+    left, right = noisy.left, noisy.right
+    out = alone("intersection", alone.table(PAIR, noisy.ids, left, right), F153, "base=[900, 10, -20]",
+                "right=[0.2, -0.1, 1.4]")  # fmt: skip
+    points, turned = traced(out)["points"], from_angles(np.radians([0.2, -0.1, 1.4]), "omega-phi-kappa")
     met = steps.intersection(left, right, F, base=[900, 10, -20], rotations=(np.eye(3), turned))
-    np.testing.assert_allclose(tables["points"]["Y1"] - tables["points"]["Y2"], met.gap, atol=1e-9)
+    np.testing.assert_allclose(axes(out["points"], "xyz"), met.xyz, atol=6e-5)
+    np.testing.assert_allclose(points["Y1"] - points["Y2"], met.gap, atol=1e-9)
+    left, right = left[:, ::-1], right[:, ::-1]  # the base along Y
+    points = traced(alone("intersection", alone.table(PAIR, noisy.ids, left, right), F153, "base=[10, 900, -20]"))[
+        "points"
+    ]
+    met = steps.intersection(left, right, F, base=[10, 900, -20], rotations=(np.eye(3), np.eye(3)), left_ray=True)
+    np.testing.assert_allclose(points["X1"] - points["X2"], met.gap, atol=1e-9)
+    np.testing.assert_allclose(points["N"] * points["y1h"], met.xyz[:, 1])
 
-    across = table(tmp_path / "across.csv", "point x_left y_left x_right y_right", ids, left[:, ::-1], right[:, ::-1])
-    tables = traced(capsys, "intersection", across, F153, "base=[10, 900, -20]")
-    met = steps.intersection(
-        left[:, ::-1], right[:, ::-1], F, base=[10, 900, -20], rotations=(np.eye(3), np.eye(3)), left_ray=True
+
+def test_resection_as_a_command(noisy: Noisy, alone: Alone) -> None:
+    out = alone(
+        "resection", alone.table("point x y x_ground y_ground z_ground", noisy.ids, noisy.left, noisy.xyz), F153
     )
-    np.testing.assert_allclose(tables["points"]["X1"] - tables["points"]["X2"], met.gap, atol=1e-9)
-    np.testing.assert_allclose(tables["points"]["N"] * tables["points"]["y1h"], met.xyz[:, 1])
-
-    photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, left, truth.xyz(ids))
-    tables = traced(capsys, "resection", photo, F153)
-    oriented = steps.resection(left, truth.xyz(ids), F)
+    tables, oriented = traced(out), steps.resection(noisy.left, noisy.xyz, F)
+    assert [values(out)[axis] for axis in "xyz"] == pytest.approx(oriented.center.tolist(), abs=1e-4)
     before, added = tables["centre_before_each_step"], tables["what_the_step_adds"]
     assert before["X0"][-1] + added["dX0"][-1] == pytest.approx(oriented.center[0], abs=1e-7)
     assert before["[vv]"][-1] == pytest.approx((oriented.residuals**2).sum())
     np.testing.assert_allclose(tables["points"]["x"] - tables["points"]["x'"], oriented.residuals[:, 0], atol=1e-9)
 
-    control = table(
-        tmp_path / "control.csv", "point x y z x_ground y_ground z_ground", ids, found.model, truth.xyz(ids)
+
+def test_absolute_orientation_and_scale_transfer_as_commands(noisy: Noisy, alone: Alone) -> None:
+    model = steps.relative(noisy.left, noisy.right, F, base=920.0).model
+    out, fitted = (
+        alone("absolute", alone.table(ON_GROUND, noisy.ids, model, noisy.xyz)),
+        steps.absolute(model, noisy.xyz),
     )
-    rows = traced(capsys, "absolute", control)["points"]
-    fitted = steps.absolute(found.model, truth.xyz(ids))
+    assert values(out)["scale"] == pytest.approx(fitted.similarity.scale)
+    rows = traced(out)["points"]
     np.testing.assert_allclose(rows["X'"] - rows["X-Xm"], fitted.residuals[:, 0], atol=1e-9)
+    out = alone("scale", alone.table("point x y z x_next y_next z_next", noisy.ids, model, model / 1.25))
+    assert values(out) == {"k": pytest.approx(1.25), "rms departure": pytest.approx(0, abs=1e-6)}
+    np.testing.assert_allclose(traced(out)["points"]["k_t"], 1.25)
 
 
-def test_traces_of_the_other_steps(tmp_path: Path, capsys: Capture) -> None:
-    marks = table(
-        tmp_path / "marks.csv",
-        "mark x y x_photo y_photo",
-        ["1", "2", "3", "4"],
-        np.array([[0.0, 0.0], [10.0, 0.1], [10.0, 10.0], [0.0, 10.0]]),
-        np.array([[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]]),
-    )
-    assert call("interior", marks, "--trace") == 0
-    out = capsys.readouterr().out
-    (line,) = re.findall(r"x' = (.*)\n", out)
-    x = eval(line.replace(" x", " * 10").replace(" y", " * 0.1"))  # noqa: S307 (an equation with its numbers)
-    rows = traced(capsys, "interior", marks)["marks"]
-    assert x == pytest.approx(rows["x'"][1], abs=1e-8)
-    assert call("interior", marks, "--trace", "transform=projective") == 0
-    assert re.search(r"x' = \(.*\) / \(", capsys.readouterr().out)
+def test_marks_as_a_command(alone: Alone) -> None:
+    measured = np.array([[100.012, -99.982], [-111.97, -100.01], [-112.0, 112.03], [100.03, 112.05]])
+    calibrated = np.array([[106.0, -106.0], [-106.0, -106.0], [-106.0, 106.0], [106.0, 106.0]])
+    marks = alone.table("mark x y x_photo y_photo", "1234", measured, calibrated)
+    text = alone.typed("interior", marks, "--trace")[1]
+    lines = [line.rsplit(None, 1) for line in text.splitlines() if line[:3] in {"x: ", "y: "}]
+    printed = {name: float(value) for name, value in lines}  # with digits enough to be used
+    terms = {"x": measured[:, 0], "y": measured[:, 1], "1": np.ones(4)}
+    by_hand = np.array([sum(printed[f"{axis}: {term}"] * terms[term] for term in terms) for axis in "xy"]).T
+    fitted = calibrated + steps.interior(measured, calibrated).residuals
+    assert np.abs(by_hand - fitted).max() < 1e-6  # mm; of four decimals 0.004
+    (line,) = re.findall(r"x' = (.*)\n", text)
+    x = eval(line.replace(" x", " * 100.012").replace(" y", " * -99.982"))  # noqa: S307 (an equation with its numbers)
+    assert x == pytest.approx(traced(alone("interior", marks))["marks"]["x'"][0], abs=1e-7)
+    assert re.search(r"x' = \(.*\) / \(", alone.typed("interior", marks, "--trace", "transform=projective")[1])
 
-    points = table(tmp_path / "points.csv", "point x y", ["1", "2"], np.array([[80.0, 60.0], [-100.0, 20.0]]))
+
+def test_refined_coordinates_as_a_command(alone: Alone) -> None:
     lens = [F153, "principal_point=[0.2, -0.1]", "k=[2e-8, 0, 0]", "flying_height=3000"]
-    rows = traced(capsys, "refine", points, *lens)["corrections"]
+    out = alone("refine", alone.table("point x y", "12", [[80.0, 60.0], [-100.0, 20.0]]), *lens)
+    rows, shift = traced(out)["corrections"], axes(out["points"], ["dx", "dy"])
     np.testing.assert_allclose(rows["lens_x"], 2e-8 * rows["r"] ** 2 * rows["x-x0"] * 1000, atol=1e-9)
     np.testing.assert_allclose(rows["x-x0"] + (rows["lens_x"] + rows["refr_x"]) / 1000, rows["x'"])
     assert (rows["refr_x"] * rows["x-x0"] < 0).all()
+    np.testing.assert_allclose(shift[:, 0], (rows["x'"] - [80.0, -100.0]) * 1000, atol=1e-3)
 
-    strip = table(tmp_path / "strip.csv", "photo omega phi kappa", ["1", "2"], np.array([[1.0, 2, 30], [3, 2, 1]]))
-    tables = traced(capsys, "chain", strip)
-    given, handed = (np.column_stack([each["1"], each["2"], each["3"]]).reshape(-1, 3, 3) for each in tables.values())
-    np.testing.assert_allclose(handed[1], given[0] @ given[1])
 
-    junction = table(
-        tmp_path / "junction.csv", "point x y z x_next y_next z_next", ["1", "2"], np.eye(3)[:2] * 3, np.eye(3)[:2] * 2
-    )
-    assert traced(capsys, "scale", junction)["points"]["k_t"].tolist() == [1.5, 1.5]
-    line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
-    control = table(tmp_path / "c.csv", "point x y z misclosure", ["1", "2", "3"], line, np.array([[1.0], [3], [6]]))
-    rows = traced(capsys, "polynomial", control, "terms=[1, X]")["points"]
+def test_the_chain_as_a_command(alone: Alone) -> None:
+    angles = [[1.0, 2.0, 30.0], [3.0, 2.0, 1.0]]
+    out = alone("chain", alone.table("photo omega phi kappa", "12", angles))
+    handed = np.radians(axes(out["points"], ["omega", "phi", "kappa"]))
+    turns = [from_angles(np.radians(each), "omega-phi-kappa") for each in angles]
+    np.testing.assert_allclose(from_angles(handed[1], "omega-phi-kappa"), turns[0] @ turns[1], atol=2e-8)
+    given, found = (np.column_stack([each[n] for n in "123"]).reshape(-1, 3, 3) for each in traced(out).values())
+    np.testing.assert_allclose(found[1], given[0] @ given[1])
+
+
+def test_a_polynomial_as_a_command(alone: Alone) -> None:
+    line = [[0.0, 0, 0, 1], [1, 0, 0, 3], [2, 0, 0, 6]]
+    out = alone("polynomial", alone.table("point x y z misclosure", "123", line), "terms=[1, X]")
+    assert [values(out)["1"], values(out)["X"]] == pytest.approx([5 / 6, 2.5])
+    rows = traced(out)["points"]
     np.testing.assert_allclose(rows["polynomial"] + rows["v"], [1, 3, 6])
     np.testing.assert_allclose(rows["X"], [0, 1, 2])
+
+
+HEAD = PAIR.replace(" ", ",")
 
 
 @pytest.mark.parametrize(
     ("lines", "options", "code", "message"),
     [
-        (["point,x_left,y_left", "1,2,3"], [], 2, "pair.csv:1: x_right: there is no column `x_right`"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4", "1,1,2,3,4"], [], 2, "point 1 stands in line 2 already"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,nan,4"], [], 2, "pair.csv:2:7: x_right"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], [], 3, "1 common points cannot orient a pair"),
-        ([], [], 2, "pair.csv: is empty"),
+        (["point,x_left,y_left", "1,2,3"], [], 2, "points.csv:1: x_right: there is no column `x_right`"),
+        ([HEAD, "1,1,2,3,4", "1,1,2,3,4"], [], 2, "point 1 stands in line 2 already"),
+        ([HEAD, "1,1,2,nan,4"], [], 2, "points.csv:2:7: x_right"),
+        ([HEAD, "1,1,2,3,4"], [], 3, "1 common points cannot orient a pair"),
+        ([], [], 2, "points.csv: is empty"),
         (["\0"], [], 2, "it has NUL bytes"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], ["-o", "model.xls"], 2, "nothing is written as '.xls'"),
-        (["point,x_left,y_left,x_right,y_right", "1,1,2,3,4"], ["base=0"], 2, "base: 0 is out of range"),
+        ([HEAD, "1,1,2,3,4"], ["-o", "model.xls"], 2, "nothing is written as '.xls'"),
+        ([HEAD, "1,1,2,3,4"], ["base=0"], 2, "base: 0 is out of range"),
     ],
-)  # fmt: skip
-def test_what_is_wrong_is_told(
-    tmp_path: Path, capsys: Capture, lines: list[str], options: list[str], code: int, message: str
-) -> None:
-    (tmp_path / "pair.csv").write_text("\n".join(lines), encoding="utf-8")
-    assert call("relative", str(tmp_path / "pair.csv"), F153, *options) == code
-    assert message in capsys.readouterr().err
+)
+def test_what_is_wrong_is_told(lines: list[str], options: list[str], code: int, message: str, alone: Alone) -> None:
+    found, _, err = alone.typed("relative", alone.write(lines), F153, *options)
+    assert (found, message in err) == (code, True)
 
 
-def test_a_missing_table_and_wrong_numbers_are_told(tmp_path: Path, capsys: Capture) -> None:
-    assert call("interior", str(tmp_path / "none.csv")) == 2
-    assert "does not exist" in capsys.readouterr().err
-    (tmp_path / "points.csv").write_text("point,x,y\n1,2,3\n", encoding="utf-8")
-    assert call("refine", str(tmp_path / "points.csv"), F153, "k=[1, nan, 0]") == 2
-    assert "--set: k[1]: `nan` is not a measured value" in capsys.readouterr().err
-
-
-def test_the_coefficients_of_an_interior_orientation_can_be_used_as_printed(tmp_path: Path, capsys: Capture) -> None:
-    measured = np.array([[100.012, -99.982], [-111.97, -100.01], [-112.0, 112.03], [100.03, 112.05]])
-    calibrated = np.array([[106.0, -106.0], [-106.0, -106.0], [-106.0, 106.0], [106.0, 106.0]])
-    marks = table(tmp_path / "marks.csv", "mark x y x_photo y_photo", ["1", "2", "3", "4"], measured, calibrated)
-    assert call("interior", marks) == 0
-    lines = [line.rsplit(None, 1) for line in capsys.readouterr().out.splitlines() if line[:3] in {"x: ", "y: "}]
-    printed = {name: float(value) for name, value in lines}
-    terms = {"x": measured[:, 0], "y": measured[:, 1], "1": np.ones(4)}
-    by_hand = np.array([sum(printed[f"{axis}: {term}"] * terms[term] for term in terms) for axis in "xy"]).T
-    fitted = calibrated + steps.interior(measured, calibrated).residuals
-    assert np.abs(by_hand - fitted).max() < 1e-6  # mm; of four decimals 0.004
+def test_a_missing_table_and_wrong_numbers_are_told(alone: Alone) -> None:
+    assert "does not exist" in alone.typed("interior", "none.csv")[2]
+    _, _, err = alone.typed("refine", alone.write(["point,x,y", "1,2,3"]), F153, "k=[1, nan, 0]")
+    assert "--set: k[1]: `nan` is not a measured value" in err

@@ -1,4 +1,4 @@
-"""The table from equations to commands: every function named runs in the command beside it."""
+"""The table from places of the sources to commands: each prints the number beside it, by the function beside it."""
 
 from __future__ import annotations
 
@@ -6,35 +6,21 @@ import contextlib
 import inspect
 import io
 import shlex
-import shutil
 import sys
 import threading
 from functools import reduce
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.sheets.sources import read
+from photostrip.sheets.sources import Shown, document_of, found_places, places, quantity_of
 from tests.loops import nonempty
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
     from types import CodeType, FrameType
-
-
-class Row(NamedTuple):
-    """A row of the table."""
-
-    equation: str
-    command: str
-    function: str
-
-
-def rows() -> list[Row]:
-    return [Row(row["equation"], row["command"], row["function"]) for row in nonempty(read("equations"))]
 
 
 def code_of(name: str) -> CodeType:
@@ -48,8 +34,8 @@ def code_of(name: str) -> CodeType:
     raise LookupError(name)
 
 
-def executed(arguments: list[str]) -> tuple[int, set[CodeType]]:
-    """Run a command; give its exit code, and the code of every function of Python that was called."""
+def executed(arguments: list[str]) -> tuple[int, set[CodeType], str]:
+    """Run a command; give its exit code, the code of every function of Python that was called, and what is printed."""
     seen: set[CodeType] = set()
 
     def record(frame: FrameType, event: str, _: Any) -> None:  # noqa: ANN401 (of the interpreter)
@@ -58,48 +44,62 @@ def executed(arguments: list[str]) -> tuple[int, set[CodeType]]:
 
     threading.setprofile(record)
     sys.setprofile(record)
+    printed = io.StringIO()
     try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
             code = main(arguments)
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
-    return code, seen
+    return code, seen, printed.getvalue()
 
 
 def test_every_source_is_in_the_table() -> None:
-    found = rows()
-    assert {row.equation.partition("]")[0] for row in found} == {
+    found = places()
+    assert {row.place.partition("]")[0] for row in found} == {
         "[000", "[001", "[002", "[003", "[004a", "[004b", "[004c",
     }  # fmt: skip
     for row in nonempty(found):
         assert code_of(row.function).co_name == row.function.rpartition(".")[2]
+    # every equation that has a number in a source, but 001 eq. 126, a notation, and 146, a definition
+    numbered = {"000": range(1, 12), "001": range(125, 154), "002": range(1, 7), "004b": range(1, 9), "004c": (1, 2)}
+    for source, numbers in nonempty(numbered.items()):
+        for number in numbers:
+            assert found_places(f"{source} eq. {number}"), (source, number)
+    for number in nonempty(range(7, 13)):
+        assert found_places(f"003 eq. 10.{number}"), number
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Give a folder with what the commands of the table read."""
-    found = tmp_path_factory.mktemp("equations")
-    shutil.copytree(ROOT / "configs", found / "configs")
-    shutil.copytree(ROOT / "sample_data/apollo15-metric-strip", found / "sample_data/apollo15-metric-strip")
-    for name, more in (("lesson", ()), ("plane", ("--set", "ground.crs=local"))):
-        made = ["simulate", str(found / "configs/simulate/film-strip.yaml"), "-o", str(found / name), "--quiet", *more]
-        assert main(made) == 0
-    with (found / "lesson/project.yaml").open("a", encoding="utf-8") as file:
-        file.write("extends: ../configs/teaching.yaml\n")
+    found = tmp_path_factory.mktemp("places")
+    assert main(["sources", "-o", str(found)]) == 0
     return found
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", sorted({row.command for row in rows()}))
-def test_the_functions_of_a_command_run_in_it(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", sorted({row.command for row in places()}))
+def test_a_command_runs_its_functions_and_prints_the_number(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What stands in print is what is typed: the text has the number, JSON agrees with it to its last digit."""
     monkeypatch.chdir(folder)
-    named = [row.function for row in rows() if row.command == command]
-    for name in nonempty(named):
-        _forget(name)
-    code, seen = executed(shlex.split(command)[1:])
-    assert code == 0
-    assert [name for name in named if code_of(name) not in seen] == []
+    rows = [row for row in places() if row.command == command]
+    for row in nonempty(rows):
+        _forget(row.function)
+    seen: set[CodeType] = set()
+    for part in command.split(" && "):
+        code, called, text = executed(shlex.split(part)[1:])
+        assert code in {0, 1}
+        seen |= called
+    traces = [each for each in shlex.split(command) if each.endswith(".txt")]
+    text += "".join((folder / each).read_text(encoding="utf-8") for each in traces)
+    document = document_of(command, folder, lambda arguments, _: executed(list(arguments))[2])
+    for row in rows:
+        assert code_of(row.function) in seen, row.function
+        assert Shown(row, quantity_of(document, row.quantity)).agrees, row.place
+        assert row.value in text, (row.place, row.value)
 
 
 def _forget(name: str) -> None:

@@ -84,16 +84,14 @@ class Recovery:
     def centers(self) -> float:
         """Largest error of a coordinate of a perspective centre, metres."""
         return max(
-            float(
-                np.abs(strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers) - true).max()
-            )
+            float(np.abs(strip.intermediate.cartesian_from_intermediate(strip.resection.centers) - true).max())
             for strip, true in zip(self.result.strips, self._of_photos(self.simulation.truth.centers), strict=True)
         )
 
     @property
     def rotations(self) -> float:
         """Largest angle between a photo's orientation and the true one, radians."""
-        found = [strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
+        found = [strip.intermediate.cartesian_rotations(strip.resection.rotations)
                  for strip in self.result.strips]  # fmt: skip
         true = self._of_photos(self.simulation.truth.rotations)
         turns = [np.swapaxes(one, -1, -2) @ other for one, other in zip(found, true, strict=True)]
@@ -126,7 +124,7 @@ def assert_exact(found: Recovery) -> None:
     assert found.result.not_determined == {}
     assert len(found.result.points.number) == len(found.simulation.observations.point_ids)
     assert not any(strip.of_photos.rejections for strip in found.result.strips)
-    assert all(strip.of_photos.resection.solved.all() for strip in nonempty(found.result.strips))
+    assert all(strip.resection.solved.all() for strip in nonempty(found.result.strips))
     given_differences = found.result.control_differences[found.simulation.control.use]
     assert np.abs(given_differences).max() < MICRON
 
@@ -338,7 +336,7 @@ def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
     assert found.centers > 0.3 * SIGMA
     assert found.rotations > 1e-6
     assert float(np.median(strip.of_photos.orientation.sigma0)) == pytest.approx(0.005, rel=0.15)
-    assert 0.003 < float(np.sqrt((strip.of_photos.resection.residuals**2).mean())) < 0.008  # mm
+    assert 0.003 < float(np.sqrt((strip.resection.residuals**2).mean())) < 0.008  # mm
 
 
 @pytest.mark.slow
@@ -368,9 +366,9 @@ def numbers(result: Result) -> dict[str, Floats]:
             f"{name} similarity": np.append(strip.absolute.similarity.shift, strip.absolute.similarity.scale),
             f"{name} misclosures": strip.absolute.misclosures,
             f"{name} rejected": np.array([[r.row, r.value, r.limit] for r in strip.of_photos.rejections]),
-            f"{name} centers": strip.of_photos.resection.centers,
-            f"{name} rotations": strip.of_photos.resection.rotations,
-            f"{name} residuals": strip.of_photos.resection.residuals,
+            f"{name} centers": strip.resection.centers,
+            f"{name} rotations": strip.resection.rotations,
+            f"{name} residuals": strip.resection.residuals,
         }
         if strip.polynomial is not None:
             found[f"{name} degree"] = np.array([strip.polynomial.degree])

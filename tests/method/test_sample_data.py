@@ -393,8 +393,8 @@ def test_strasbourg_orientations_agree_with_the_published_bundle() -> None:
     found = strasbourg()
     strip = found.strips[0]
     centers, rotations, sigmas = published_orientations()
-    shifts = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers) - centers
-    turns = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations) @ rotations.transpose(0, 2, 1)
+    shifts = strip.intermediate.cartesian_from_intermediate(strip.resection.centers) - centers
+    turns = strip.intermediate.cartesian_rotations(strip.resection.rotations) @ rotations.transpose(0, 2, 1)
     angles = np.degrees(np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1))
     assert np.abs(shifts).max() < 1.2
     assert np.abs(angles).max() < 0.04

@@ -203,9 +203,7 @@ def test_points_seen_once_are_listed_and_change_nothing() -> None:
     }
     np.testing.assert_array_equal(before.points.number, after.points.number)
     np.testing.assert_array_equal(before.points.cartesian, after.points.cartesian)
-    np.testing.assert_array_equal(
-        before.strips[0].of_photos.resection.rotations, after.strips[0].of_photos.resection.rotations
-    )
+    np.testing.assert_array_equal(before.strips[0].resection.rotations, after.strips[0].resection.rotations)
 
 
 # ------------------------------------------------------------------------------------------ the base across the frame

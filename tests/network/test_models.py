@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.network.adjustment import solve
-from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ModelObservations, StartValues
+from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.network.reliability import cofactors_of, coordinates_of, joint_cofactors
 from tests.models import SIGMA, truth
 
@@ -39,7 +39,7 @@ def network(models: int = 4, *, free: bool = False, correlated: bool = False) ->
     nudged = Rotation.from_rotvec(rng.normal(0, 1e-3, (models, 3))).as_matrix()
     nodes = np.concatenate([given.points, given.centers])
     return BundleProblem(
-        images=ModelObservations(
+        images=ImageObservations(
             photo=given.model,
             point=given.node,
             xy=xyz - middle[given.model],
@@ -60,7 +60,6 @@ def network(models: int = 4, *, free: bool = False, correlated: bool = False) ->
 def residuals(problem: BundleProblem, unknowns: Floats) -> Floats:
     """Misfits in standard deviations, written out; of each model shift, rotation vector and logarithm of the scale."""
     m, images = problem.photos, problem.images
-    assert isinstance(images, ModelObservations)
     assert problem.start.scales is not None
     of_models, points = unknowns[: 7 * m].reshape(m, 7), unknowns[7 * m :].reshape(-1, 3)
     found = []

@@ -42,8 +42,8 @@ def test_points_and_photos_are_the_same(both: tuple[Result, Result]) -> None:
     np.testing.assert_allclose(in_space.points.ground, on_map.points.ground, rtol=0, atol=MILLIMETRE)
     first, second = (r.strips[0] for r in both)
     np.testing.assert_allclose(
-        second.intermediate.cartesian_from_intermediate(second.of_photos.resection.centers),
-        first.intermediate.cartesian_from_intermediate(first.of_photos.resection.centers),
+        second.intermediate.cartesian_from_intermediate(second.resection.centers),
+        first.intermediate.cartesian_from_intermediate(first.resection.centers),
         rtol=0,
         atol=MILLIMETRE,
     )

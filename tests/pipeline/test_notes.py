@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import pytest
 
-from photostrip.pipeline.photos_on_control import polynomial_notes
+from photostrip.pipeline.strip_notes import polynomial_notes
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Strip

@@ -17,7 +17,7 @@ def test_heights_are_those_of_the_whole_run() -> None:
     ground, result = tie_ground_frames(inputs, settings, None), triangulate(inputs, settings)
     found = heights_of(orient_interior(inputs, settings).observations, inputs, settings, ground)
     (strip,) = result.strips
-    centers = strip.intermediate.cartesian_from_intermediate(strip.centers)
+    centers = strip.intermediate.cartesian_from_intermediate(strip.placed.centers)
     flying, terrain = (ground.output.geodetic(xyz)[:, 2].mean() for xyz in (centers, result.points.cartesian))
     assert found.flying == pytest.approx(flying, abs=1e-6)
     assert found.ground == pytest.approx(terrain, abs=1e-6)

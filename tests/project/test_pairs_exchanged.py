@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings
+from photostrip.formats.faults import Findings
+from photostrip.formats.measured import Manner, read_measurements
 from photostrip.project.check import check_project
 from photostrip.simulation import Flight, Spec
 from photostrip.simulation.simulation import simulate

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import read_result
+from photostrip.formats.result_json import read_result
 from photostrip.project.loading import load_project
 from tests.project.samples import FILES, OBSERVATIONS, PROJECT, Sample, sample
 from tests.results import spec, write_project

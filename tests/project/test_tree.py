@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from photostrip.formats.text.findings import Findings
+from photostrip.formats.faults import Findings
 from photostrip.project import reading
 from photostrip.project.reading import Node, Place, fault_at, key_path, parse
 

@@ -78,7 +78,7 @@ def check_reports(result: photostrip.Result, folder: Path) -> None:
     assert again.report("html") == (folder / "report.html").read_text(encoding="utf-8")
     assert again.report("text") == result.report("text")
     assert again.report("md") == result.report("md")
-    assert "plan" in again.pictures()
+    assert "plan" in dir(again.plot)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

@@ -19,7 +19,7 @@ from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel,
 from photostrip.report.pictures.places import plan_of, rays_of
 from photostrip.report.pictures.plan import footprint_pictures, footprints
 from photostrip.report.pictures.result import picture_files, pictures_of
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX
 from photostrip.simulation import Models
 from photostrip.simulation.flight import surface
 from photostrip.simulation.simulation import simulate

@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from photostrip.errors import InputError
-from photostrip.formats.output.result_json import checked, to_json
+from photostrip.formats.result_json import checked, to_json
 from photostrip.library.result import Result
 from photostrip.report.page.layout import cells, to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words

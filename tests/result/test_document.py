@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.document import document_of
-from photostrip.result.numbers import natural, rounded, significant
-from photostrip.result.quantities import MATRIX
+from photostrip.result.numbers import MATRIX, natural
 from photostrip.result.summary import TOLERANCES, counts_of
 from photostrip.result.table import Table, plain_of
 from photostrip.simulation.simulation import simulate
@@ -68,68 +67,32 @@ def leaves(value: object) -> Iterator[object]:
 # ------------------------------------------------------------------------------------------- the fixed contract
 
 
+# keys that other programs read; what stands there is described, and every result keeps its description
 FIXED = {
-    "photostrip_result": int,
-    "name": str,
-    "status": str,
-    "adjustment": str,
-    "frame": {"crs": str, "axes": list},
-    "photos": [{"id": str, "strip": str, "x": float, "y": float, "z": float, "r11": float, "angle_1": float}],
-    "angles": {"system": str, "unit": str},
-    "points": [{"id": str, "role": str, "x": float, "y": float, "z": float, "rays": int}],
-    "models": [
-        {
-            "left": str,
-            "right": str,
-            "elements_kappa1": float,
-            "sigma0_um": float,
-            "max_parallax_um": float,
-            "points_used": int,
-            "scale_factor": float,
-        }
-    ],
-    "control": [{"id": str, "role": str, "use": str, "dx": float, "dy": float, "dz": float}],
-    "summary": {
-        "sigma0_um": float,
-        "control_rms": {"x": float, "y": float, "z": float},
-        "check_rms": {"x": float, "y": float, "z": float},
-        "photo_scale": float,
-    },
-    "polynomials": [{"degree": int}],
-    "polynomial_evidence": [{"strip": str, "group": str, "degree": int}],
+    "frame": "crs axes",
+    "angles": "system unit",
+    "photos": "id strip x y z r11 angle_1",
+    "points": "id role x y z rays",
+    "models": "left right elements_kappa1 sigma0_um max_parallax_um points_used scale_factor",
+    "control": "id role use dx dy dz",
+    "summary": "sigma0_um control_rms check_rms photo_scale",
+    "polynomials": "degree",
+    "rejected": "photo point stage test value limit reason",
 }
-
-
-def check_shape(value: object, shape: object, path: str) -> None:
-    if isinstance(shape, dict):
-        assert isinstance(value, dict), path
-        for key, each in nonempty(shape.items()):
-            assert key in value, f"{path}.{key}"
-            check_shape(value[key], each, f"{path}.{key}")
-    elif isinstance(shape, list):
-        assert isinstance(value, Table), path
-        assert value, path
-        for each in value:
-            check_shape(each, shape[0], path)
-    elif isinstance(shape, type):
-        assert isinstance(value, shape), f"{path} is {value!r}"
 
 
 @pytest.mark.parametrize("frame", FRAMES)
 def test_the_fixed_keys_are_there(frame: str) -> None:
     document = case(frame).document
-    check_shape(document, FIXED, "result")
+    assert document.keys() >= {"name", "status", "adjustment", *FIXED}
+    for block, keys in nonempty(FIXED.items()):
+        there = document[block].columns if isinstance(document[block], Table) else document[block]
+        assert set(keys.split()) <= set(there)
     assert document["photostrip_result"] == 2
     assert document["frame"]["crs"] == FRAMES[frame].crs
     assert document["frame"]["axes"] == list(FRAMES[frame].axes)
     assert {row["role"] for row in document["points"]} == {"new", "control", "check"}
     assert set(MATRIX) <= set(document["photos"].columns)
-
-
-def test_a_rejection_has_its_fixed_keys() -> None:
-    document = case("local", 1, 5.0, GrossError("image", axis="y")).document
-    for row in nonempty(document["rejected"]):
-        assert row.keys() >= {"photo", "point", "stage", "test", "value", "limit", "reason"}
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -220,22 +183,6 @@ def test_the_same_holds_in_a_frame_that_is_not_that_of_the_control(crs: str, axe
     assert worst_reprojection(found) < MICROMETRE_STEP
 
 
-def test_axes_turn_over_what_is_written_and_nothing_else() -> None:
-    east, north = case("projected").document, case("north first").document
-    for key in ("photos", "points"):
-        for a, b in zip(east[key], north[key], strict=True):
-            assert a["id"] == b["id"]
-            assert xyz(a) == [b["y"], b["x"], b["z"]]
-    for a, b in nonempty(zip(east["control"], north["control"], strict=True)):
-        assert (a["dx"], a["dy"], a["dz"]) == (b["dy"], b["dx"], b["dz"])
-        assert [a[f"sigma_{k}"] for k in (1, 2, 3)] == [b[f"sigma_{k}"] for k in (2, 1, 3)]
-    for key in ("control_rms", "check_rms"):
-        a, b = east["summary"][key], north["summary"][key]
-        assert (a["x"], a["y"], a["z"]) == (b["y"], b["x"], b["z"])
-    assert all((east["photos"][name] == north["photos"][name]).all() for name in MATRIX)
-    assert east["summary"]["check"] == north["summary"]["check"]
-
-
 @pytest.mark.parametrize("unit", ["deg", "gon", "rad"])
 @pytest.mark.parametrize(
     ("system", "moved", "sign"),
@@ -288,16 +235,6 @@ def test_control_in_a_grid_and_a_geocentric_result_give_the_same_plan_and_height
     assert space["summary"]["check"]["height"]["rms"] == pytest.approx(
         grid["summary"]["check"]["height"]["rms"], abs=2 * GROUND_STEP
     )
-
-
-def test_plan_and_height_of_geocentric_control() -> None:
-    """Height is along the normal: it grows when the point moves away from the centre of the Earth."""
-    document = case("geocentric").document
-    for row in nonempty(document["control"]):
-        point = next(p for p in document["points"] if p["id"] == row["id"])
-        up = np.array(xyz(point)) / np.linalg.norm(xyz(point))
-        radial = float(up @ [row["dx"], row["dy"], row["dz"]])
-        assert row["height"] == pytest.approx(radial, abs=0.004 * row["plan"] + 2 * GROUND_STEP)
 
 
 def partial() -> Case:
@@ -423,14 +360,8 @@ def test_models_without_errors_agree() -> None:
     assert document["summary"]["image_rms_um"] < 0.01
 
 
-def test_models_with_errors_disagree_most_in_height() -> None:
-    """A height comes from a parallax over the base: it is worse than plan by depth over base and the root of two."""
-    joints = case("projected", 2).document["junctions"]
-    up = math.sqrt(np.mean([joint["discrepancy_up"] ** 2 for joint in joints]))
-    along = math.sqrt(np.mean([joint["discrepancy_along"] ** 2 for joint in joints]))
-    assert 0.05 < up < 0.6
-    assert along < up / 3
-    for joint in nonempty(joints):
+def test_discrepancies_are_at_photo_scale_too() -> None:
+    for joint in nonempty(case("projected", 2).document["junctions"]):
         scale = next(s["photo_scale"] for s in case("projected", 2).document["strips"] if s["id"] == joint["strip"])
         assert joint["discrepancy_um_up"] == pytest.approx(joint["discrepancy_up"] / scale * 1e6, abs=0.1)
 
@@ -530,17 +461,13 @@ def test_the_drift_found_is_the_slope_of_the_polynomial() -> None:
     assert terms["t"] == pytest.approx(terms["coefficient"] / terms["sigma"], rel=1e-2, abs=0.01)
 
 
-def test_without_a_polynomial_there_is_no_block() -> None:
-    document = solved(case("local").inputs, Settings(adjustment="similarity")).document
-    assert document["adjustment"] == "similarity"
-    assert "polynomials" not in document
-    assert document["strips"][0]["scale_drift_found_ppm"] is None
-
-
 def test_one_polynomial_for_each_strip() -> None:
     document = case("projected", 2).document
     assert [block["strip"] for block in document["polynomials"]] == [strip["id"] for strip in document["strips"]]
-    assert "polynomial" not in document
+    without = solved(case("local").inputs, Settings(adjustment="similarity")).document
+    assert without["adjustment"] == "similarity"
+    assert "polynomials" not in without
+    assert without["strips"][0]["scale_drift_found_ppm"] is None
 
 
 # -------------------------------------------------------------------------------------------------- order, notes
@@ -558,13 +485,6 @@ def test_photos_stand_in_flight_order_and_points_in_natural_order() -> None:
         *(residuals.where(photo=photo)["point"] for photo in flown),
     ):
         assert list(names) == sorted(names, key=natural)
-
-
-def test_natural_order() -> None:
-    names = ["P10", "P2", "P02", "p1", "10", "9", "", "P2a", "P2-10", "P2-9", "9" * 5000]
-    assert sorted(names, key=natural) == [
-        "", "9", "10", "9" * 5000, "P02", "P2", "P2-9", "P2-10", "P2a", "P10", "p1",
-    ]  # fmt: skip
 
 
 @pytest.mark.slow
@@ -663,12 +583,6 @@ def test_every_tolerance_has_a_value() -> None:
     assert all(row["value"] > 0 for row in nonempty(document["tolerances"]))
 
 
-def test_a_sound_project_is_good() -> None:
-    document = case("projected", 2).document
-    assert document["status"] == "good", document["verdict"]
-    assert document["verdict"]["look_at"] == []
-
-
 def displaced(role: str, metres: float) -> Document:
     """Displace the third given point of a role to the east."""
     inputs = case("projected").inputs
@@ -702,14 +616,6 @@ def test_wrong_control_is_worth_a_look() -> None:
     assert summary["control"]["normalised"] < 5
 
 
-@pytest.mark.slow
-def test_coordinates_worse_than_stated_are_worth_a_look() -> None:
-    inputs = case("projected", 2).inputs
-    o = inputs.observations
-    document = solved(replace(inputs, observations=replace(o, sigma=o.sigma / 4))).document
-    assert any("times worse than stated" in text for text in document["verdict"]["look_at"])
-
-
 # --------------------------------------------------------------------------------------------------- corrections
 
 
@@ -735,16 +641,6 @@ def test_curvature_by_formula_has_its_size() -> None:
     largest = max(float(((place - middle) ** 2).sum()) for place in points.values()) / 2 / 6_371_000
     assert found["largest"] == pytest.approx(largest, abs=0.002)
     assert "6371000 m" in found["treatment"]
-
-
-# ------------------------------------------------------------------------------------------------------- rounding
-
-
-def test_rounding() -> None:
-    assert rounded([1 / 3, math.nan, -1e-9, math.inf], 4) == [0.3333, None, 0.0, None]
-    assert rounded(math.nan, 2) is None
-    assert rounded([[500100.123456]], 4) == [[500100.1235]]
-    assert significant([0.000123456, 0.0, math.nan, 98765.4]) == [0.0001235, 0.0, None, 98770.0]
 
 
 # ----------------------------------------------------------------------------------------- errors along the base

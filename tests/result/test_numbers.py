@@ -23,10 +23,6 @@ def test_rows_stand_by_number_then_by_rank() -> None:
     assert order_of(number[:0], rank[:0]).tolist() == []
 
 
-def test_numbers_count_as_numbers() -> None:
-    assert natural_rank(("P10", "P2", "P02", "P1")).tolist() == [3, 2, 1, 0]
-
-
 @given(st.floats(), st.integers(0, 12))
 @example(-0.0, 2)
 @example(-1e-9, 4)

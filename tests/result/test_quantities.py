@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from photostrip.formats.output.result_json import checked, read_baseline, to_json
+from photostrip.formats.result_json import checked, read_baseline, to_json
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.description import LEFT_OUT, Block, Quantity, described
-from photostrip.result.quantities import rounded_as
+from photostrip.result.numbers import rounded_as
 from photostrip.result.table import Table, plain_of
 from photostrip.simulation import Models, simulate
 from tests.loops import nonempty

@@ -14,10 +14,10 @@ from photostrip.pipeline.run import triangulate
 from photostrip.report.page.layout import to_text
 from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.document import document_of
-from photostrip.result.points.standing_out import stand_out
+from photostrip.result.given import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
+from photostrip.simulation.spec import Control, Flight, Points, Spec
 from tests.results import Document, case, in_tables, solved, spec
 from tests.simulated import inputs_of, settings_of
 
@@ -57,13 +57,6 @@ def test_check_points_verify() -> None:
     document = with_checks(2, 1)
     assert (document["status"], document["verdict"]["verified"]) == (GOOD, True)
     assert document["verdict"]["verification"] == "2 check points in plan and 1 in height"
-
-
-def test_what_is_to_be_looked_at_can_be_unverified_too() -> None:
-    document = case("projected", 2).document
-    verdict = {**document["verdict"], "verified": False, "verification": "no point verifies the result: do this"}
-    text = quiet({**document, "status": LOOK, "verdict": {**verdict, "look_at": ["a thing"]}})
-    assert text.count("No point verifies the result: do this.") == 1
 
 
 # ------------------------------------------------------------------------------------------- the tests of the program
@@ -130,20 +123,6 @@ def test_a_cause_that_is_known_needs_less_evidence() -> None:
     assert found["status"] == LOOK
     assert "in height 2.2 times, 5 of 10 inside the 95 % interval" in found["look_at"][0]
     assert found["look_at"][0].endswith("try `earth_curvature: model`")
-
-
-def test_of_contradicting_data_a_deformation_is_told_without_metres() -> None:
-    document = moved(0, 0.0)
-    bent = {"bending": {"models": 7, "p": 0.0, "t": 9.0, "at_corner_m": 23723.735}}
-    finding = {
-        "code": "P105", "severity": "error", "message": "", "accepted": False, "points": [], "strips": []
-    }  # fmt: skip
-    alone = {**document, "common_deformation": bent}
-    assert any("23723" in text for text in verdict_of(alone)["look_at"])
-    found = verdict_of({**alone, "findings": [finding]})
-    assert found["status"] == FAILED
-    assert not any("23723" in text for text in found["look_at"])
-    assert any(text.startswith("7 models are deformed alike (bending): t = 9.0") for text in found["look_at"])
 
 
 @pytest.mark.slow
@@ -235,28 +214,6 @@ def test_sound_differences_hardly_ever_stand_out() -> None:
     rng = np.random.default_rng(20261122)
     wrong = [stand_out(rng.normal(size=n), 1, np.full(n, 1e-9)).any() for n in (2, 4, 9, 30) for _ in range(1500)]
     assert np.mean(wrong) < 0.002
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [21, 22])
-def test_a_principal_distance_one_percent_off_over_relief_is_not_good(seed: int) -> None:
-    """Heights are half a metre to a metre off where control fits: only the check points see it."""
-    wanted = replace(
-        spec("projected"),
-        seed=seed,
-        flight=Flight(photos=8),
-        terrain=Terrain(relief=200.0),
-        control=Control(check=12),
-    )
-    inputs = inputs_of(simulate(wanted))
-    assert solved(inputs).document["status"] == GOOD
-    wrong = replace(inputs.strips[0].camera, principal_distance=inputs.strips[0].camera.principal_distance * 1.01)
-    given = replace(inputs, strips=(replace(inputs.strips[0], camera=wrong),))
-    assert solved(given).document["status"] != GOOD  # whatever the bundle makes of it
-    document = solved(given, Settings(adjustment="polynomial")).document
-    assert document["precision"]["check"]["tests"][0]["p"] < 0.001
-    assert document["status"] == LOOK
-    assert any(text.startswith("the check points are farther off") for text in document["verdict"]["look_at"])
 
 
 @pytest.mark.parametrize(("noise", "status"), [(0.0, LOOK), (0.012, LOOK), (0.1, FAILED)])

@@ -113,7 +113,7 @@ def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
         caption += f" The {len(shown)} of {len(rows)} photos with the largest residuals, in flight order."
     words = f"{counted(len(rows), 'photo')}; the largest rms is {sizes[worst[0]]:.1f} µm in photo {worst[0]}."
     bars = [Bar(bar * factor, f"{bar:g} µm")]
-    return chart("image-residuals", ("Image residuals by photo", caption, words), panels, columns=COLUMNS, bars=bars)
+    return chart("residuals", ("Image residuals by photo", caption, words), panels, columns=COLUMNS, bars=bars)
 
 
 def _planes(plan: Plan, rays: Rays, at: Floats, used: Flags) -> list[Picture]:

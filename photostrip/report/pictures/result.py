@@ -16,7 +16,7 @@ SECTIONS = {
     "precision-height": "precision",
     "deformation": "control",
     "check": "check",
-    "image-residuals": "images",
+    "residuals": "images",
     "image-plane": "images",
     "histogram": "images",
 }

@@ -31,7 +31,6 @@ SECTIONS: tuple[tuple[str, str, Callable[[Document], Iterator[Part]]], ...] = (
     ("classical", "The classical strip adjustment beside it", network.classical),
     ("weights", "Weights of the control", points.weights),
     ("precision", "Precision", points.precision),
-    ("deformations", "Deformation of models", formation.deformations),
     ("control", "Control points", points.control),
     ("check", "Check points", points.check),
     ("marks", "Marks of given points", points.marks),

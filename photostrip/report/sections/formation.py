@@ -18,7 +18,6 @@ from photostrip.report.page.tables import (
     metres,
     micrometres,
     percent,
-    signed,
     tabulated,
 )
 from photostrip.report.sections.project import of_models
@@ -182,31 +181,6 @@ def models(document: Document) -> Iterator[Part]:
     missing = [photo["id"] for photo in document["photos"] if photo["x"] is None]
     yield Facts((*facts, *([("photos without a centre", ", ".join(missing))] if missing else [])))
     yield keyed(document["models"], "id left+right points_used points_rejected centers model_scale base strip:2")
-
-
-def deformations(document: Document) -> Iterator[Part]:
-    """Give twist and bending of the models that have the height control for it."""
-    rows = document.get("deformations", ())
-    if not len(rows):
-        return
-    bent = sum(rows.values("significant"))
-    means = [
-        f"{name} {signed(each['at_corner_m'])} m at a corner, t = {fixed(each['t'], 1)}"
-        for name, each in document.get("common_deformation", {}).items()
-        if each["t"] is not None
-    ]
-    enough = f"{counted(len(rows), 'model')} {'has' if len(rows) == 1 else 'have'} enough height control"
-    verdict = f"{bent or 'none'} of them {'are' if bent > 1 else 'is'} deformed"
-    # of data that contradict themselves as a whole metres mean nothing
-    sound = not any(each["severity"] == "error" and not each["accepted"] for each in document.get("findings", []))
-    common = f" On average over all models: {'; '.join(means)}." if means and sound else ""
-    text = f"{enough} to show twist (x y) and bending (x²); {verdict} (t test of all together at 5 %).{common}"
-    yield Words(text, "look" if bent else "")
-    keys = (
-        "left+right points twist_at_corner_m twist_t bending_at_corner_m bending_t t_limit omega2_arcsec:2 "
-        "alpha2_minus_alpha1_arcsec:2 strip:3"
-    )
-    yield keyed(rows, keys)
 
 
 def absolute(document: Document) -> Iterator[Part]:

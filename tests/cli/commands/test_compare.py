@@ -11,11 +11,9 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.comparison import Tolerances, baseline_of
-from photostrip.comparison.tolerances import SETS, UNITS
+from photostrip.comparison.comparison import SETS, UNITS
 from photostrip.errors import InputError
-from photostrip.formats.output.result_json import to_json
-from photostrip.formats.output.result_lines import line_finder
-from photostrip.formats.text import writing
+from photostrip.formats.result_json import line_finder, to_json
 from photostrip.project.tolerances import load_tolerances
 from photostrip.report.page.messages import Case, to_junit
 from tests.loops import nonempty
@@ -154,7 +152,7 @@ def test_a_baseline_that_cannot_be_written_stays_whole(files: Path, monkeypatch:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(writing, "_write", full)
+        patched.setattr("photostrip.formats.files._write", full)
         assert main(["compare", "result", "other.json", "--update"]) == 2
     (files / "result/result.json").write_text('{"photostrip_result": 2}', encoding="utf-8")  # is never a baseline
     assert main(["compare", "result", "other.json", "--update"]) == 2

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_json import to_json
+from photostrip.formats.result_json import to_json
 from tests.loops import nonempty
-from tests.result.statement.test_evidence import GOOD, block, certified
+from tests.result.test_evidence import GOOD, block, certified
 from tests.results import case
 
 if TYPE_CHECKING:

@@ -60,9 +60,7 @@ def test_without_noise_the_truth_comes_back(title: str) -> None:
     assert np.nanmax(np.abs(check)) < MICROMETRE
     assert result.bundle is not None
     assert result.bundle.screened.rejections == ()
-    centers = np.concatenate(
-        [s.intermediate.cartesian_from_intermediate(s.of_photos.resection.centers) for s in result.strips]
-    )
+    centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.resection.centers) for s in result.strips])
     assert np.abs(centers - simulation.truth.centers).max() < MICROMETRE
 
 

@@ -49,7 +49,7 @@ def test_strips_without_control_are_carried_by_the_others() -> None:
     assert np.abs(off).max() < EXACT
     place = {photo: row for row, photo in enumerate(simulated.truth.photo_ids)}
     for strip in nonempty(result.strips):
-        found = strip.intermediate.cartesian_from_intermediate(strip.centers)
+        found = strip.intermediate.cartesian_from_intermediate(strip.placed.centers)
         assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
 
 

@@ -60,7 +60,7 @@ def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str,
     assert np.abs(result.points.cartesian - simulated.truth.points.xyz[result.points.number]).max() < EXACT
     place = {photo: row for row, photo in enumerate(simulated.truth.photo_ids)}
     for strip in nonempty(result.strips):
-        found = strip.intermediate.cartesian_from_intermediate(strip.centers)
+        found = strip.intermediate.cartesian_from_intermediate(strip.placed.centers)
         assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
     assert len(result.ties.number) > 3
     assert np.abs(result.ties.difference).max() < EXACT
@@ -110,7 +110,7 @@ def test_standard_deviations_are_those_of_repetitions() -> None:
         found = triangulate(replace(again, control=replace(first.control, enu=enu)), settings)
         (strip,) = found.strips
         points.append(found.points.cartesian - given.points[found.points.number])
-        places.append(strip.intermediate.cartesian_from_intermediate(strip.centers) - given.centers)
+        places.append(strip.intermediate.cartesian_from_intermediate(strip.placed.centers) - given.centers)
     for samples, covariances in (
         (np.array(points), whole.precision.points),
         (np.array(places), whole.precision.photos[0][:, :3, :3]),

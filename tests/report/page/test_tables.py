@@ -16,7 +16,7 @@ from photostrip.report.html import to_html
 from photostrip.report.page.parts import DASH, Column, Table
 from photostrip.report.page.tables import Field, keyed, tabulated
 from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.result.adjustment.bundle import kinds
+from photostrip.result.bundle import kinds
 from photostrip.result.table import Table as ResultTable
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty

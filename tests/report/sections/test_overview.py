@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from photostrip.formats.output.result_json import read_baseline
+from photostrip.formats.result_json import read_baseline
 from photostrip.report.page.layout import to_text
 from photostrip.report.page.parts import Facts, Section, Table, Words
 from photostrip.report.sections.accuracy_report import NAMES, chosen_sections, sections_of, title_of
@@ -153,6 +153,6 @@ def test_every_section_has_a_name_and_keeps_its_place() -> None:
             found += sections
     assert tuple(found) == sections_of(document)
     assert missing == [
-        "findings", "fiducials", "links", "models", "bundle", "classical", "deformations", "cross-validation",
+        "findings", "fiducials", "links", "models", "bundle", "classical", "cross-validation",
         "certificate",
     ]  # fmt: skip

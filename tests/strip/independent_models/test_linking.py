@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
+from photostrip.pipeline.formed_models import form_models, models_of
 from photostrip.pipeline.inputs import ModelStrip, Settings
-from photostrip.pipeline.strip_method import form_models, models_of
 from photostrip.strip import linked_models
 from photostrip.strip.linked_models import LinkSettings
 from tests.models import SIGMA, truth

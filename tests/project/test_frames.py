@@ -1,0 +1,129 @@
+"""Ground frames of a project: zones joined by common points, datums tied once."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from shutil import copytree
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.pipeline.run import triangulate
+from photostrip.project.loading import adjust_project, load_project
+from tests.geodesy.test_zones import in_both
+from tests.project.samples import FILES, PROJECT, Sample, sample
+
+if TYPE_CHECKING:
+    from photostrip.pipeline.results import Result
+
+
+LISTS = """\
+control:
+  - file: west.csv
+    crs: local
+    axes: [east, north, up]
+    sigma: [0.05, 0.06, 0.08]
+  - file: east.csv
+    crs: local
+    axes: [north, east, up]
+    sigma: [0.05, 0.06, 0.08]
+    other_zone: true
+"""
+
+
+def project(folder: Path, common: int = 5, role: str = "control") -> tuple[Sample, np.ndarray]:
+    """Write a project whose point P2 is known in the other zone only; return its coordinates in the first zone."""
+    west, east = in_both(common + 2, 10_000.0)
+    head = "point,x,y,z,use,role\n"
+    first = [f"P1,{west[0, 0]:.4f},{west[0, 1]:.4f},100,xyz,control\n"]
+    second = [f"P2,{east[1, 1]:.4f},{east[1, 0]:.4f},120,xyz,control\n"]
+    for number in range(2, common + 2):
+        first.append(f"B{number},{west[number, 0]:.4f},{west[number, 1]:.4f},0,off,{role}\n")
+        second.append(f"B{number},{east[number, 1]:.4f},{east[number, 0]:.4f},0,off,{role}\n")
+    before, after = PROJECT.index("control:"), PROJECT.index("output:")
+    text = PROJECT[:before] + LISTS + PROJECT[after:].replace("tolerances: {check_rms_xy: 0.40}\n", "")
+    files = {**FILES, "project.yaml": text, "west.csv": head + "".join(first), "east.csv": head + "".join(second)}
+    return sample(folder, files), west[1]
+
+
+def test_points_of_the_other_zone_come_into_the_first(tmp_path: Path) -> None:
+    given, expected = project(tmp_path)
+    loaded = given.load()
+    control = loaded.inputs.control
+    assert control.ids == ("P1", "P2")
+    assert control.enu[1] == pytest.approx([*expected, 120.0], abs=2e-3)
+    (note,) = (note for note in loaded.hints if note.code == "zones-joined")
+    assert "5 points of both" in note.message
+    assert "powers up to 3: rms 0.00" in note.message
+
+
+def test_two_points_join_without_a_check(tmp_path: Path) -> None:
+    (note,) = (note for note in project(tmp_path, 2)[0].load().hints if note.code == "zones-joined")
+    assert note.message.endswith("with powers up to 1: nothing checks them")
+
+
+def test_check_points_join_nothing(tmp_path: Path) -> None:
+    (line,) = project(tmp_path, role="check")[0].lines()
+    assert line.startswith("project.yaml:30:17: control[1].other_zone: 0 points of this list in the first one")
+
+
+def test_one_common_point_is_not_enough(tmp_path: Path) -> None:
+    (line,) = project(tmp_path, 1)[0].lines()
+    assert "1 point of this list" in line
+
+
+def test_zones_of_known_projections_need_no_points(tmp_path: Path) -> None:
+    given, _ = project(tmp_path)
+    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("crs: local", "crs: EPSG:32633")
+    given.write("project.yaml", text)
+    assert any("other_zone: zones of a known projection are tied by their formulas" in line for line in given.lines())
+
+
+def test_the_first_list_is_no_other_zone(tmp_path: Path) -> None:
+    given, _ = project(tmp_path)
+    text = (tmp_path / "project.yaml").read_text(encoding="utf-8")
+    axes = "    axes: [east, north, up]\n"
+    given.write("project.yaml", text.replace(axes, f"{axes}    other_zone: true\n", 1))
+    assert any("brought into the zone of the first one" in line for line in given.lines())
+
+
+SAMPLE = Path("sample_data/simulated-20")
+ED50 = ("control[0].crs=EPSG:23030", "output.crs=EPSG:32630")
+
+
+@cache
+def plain() -> Result:
+    """Adjust the sample as it is."""
+    return adjust_project(load_project(SAMPLE / "project.yaml"))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
+@pytest.mark.parametrize(
+    "overrides", [ED50, ("output.crs=EPSG:32634",), ("control[0].crs=local", "processing.earth_curvature=model")]
+)
+def test_what_is_overridden_counts(overrides: tuple[str, ...]) -> None:
+    project = load_project(SAMPLE / "project.yaml", overrides)
+    found, anew = adjust_project(project), triangulate(project.inputs, project.settings)
+    assert [frame.describe() for frame in found.frames] == [frame.describe() for frame in anew.frames]
+    assert np.array_equal(found.points.ground, anew.points.ground)
+    assert found.output.describe() != plain().output.describe()
+    assert np.abs(found.points.ground - plain().points.ground).max() > 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
+def test_each_project_has_its_own_datum_shift(tmp_path: Path) -> None:
+    """PROJ goes from ED50 to WGS 84 by one operation in Germany and by another in Spain."""
+    south = tmp_path / "south"
+    copytree(SAMPLE, south)
+    control = (south / "control.csv").read_text()
+    assert control.count(",55") > 10
+    (south / "control.csv").write_text(control.replace(",55", ",45"))  # north, by 1000 km
+    both = [adjust_project(load_project(each / "project.yaml", ED50)) for each in (SAMPLE, south)]
+    alone = [triangulate(each.inputs, each.settings) for each in both]
+    shifts = [each.frames[0].datum_shift for each in both]
+    assert shifts == [each.frames[0].datum_shift for each in alone]
+    assert shifts[0] != shifts[1]
