@@ -10,6 +10,7 @@ import argparse
 import ast
 import contextlib
 import inspect
+import json
 import re
 import textwrap
 from itertools import pairwise
@@ -27,6 +28,7 @@ from photostrip.plausibility.finding import CAUSES
 from photostrip.project.editors import KINDS as FILES
 from photostrip.project.editors import keys_page
 from photostrip.result.schema import result_page
+from tests.renew_notebooks import page as notebook_page
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -229,7 +231,7 @@ TABLES: dict[str, Callable[[], str]] = {
 
 def for_the_site(page: str) -> str:
     """Put the tables in, and take away what stands behind the kind of a block: sites take such a line for prose."""
-    page = re.sub(r"(?m)^<!-- table: (\w+) -->$", lambda found: TABLES[found[1]](), page)
+    page = re.sub(r"(?m)^<!-- table: (\w+) -->$", lambda found: TABLES[found[1]](), page).replace(".ipynb)", ".md)")
     return re.sub(r"(?m)^(```[a-z]+) .*$", r"\1", page)
 
 
@@ -239,6 +241,9 @@ def main() -> None:
     copy = parser.parse_args().folder
     for page in copy.rglob("*.md"):
         page.write_text(for_the_site(page.read_text(encoding="utf-8")), encoding="utf-8")
+    for notebook in copy.rglob("*.ipynb"):
+        text = notebook_page(json.loads(notebook.read_text(encoding="utf-8")))
+        notebook.with_suffix(".md").write_text(text, encoding="utf-8")
     folder = copy / "reference"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "python.md").write_text(python_page(), encoding="utf-8")

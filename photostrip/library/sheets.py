@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -169,19 +170,16 @@ def _over_photo(
 
 def _orientation(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:
     given, reading = read_keys(keys.OrientationFile, path, assignments)
-    camera, sightings, sigma = keys.only_camera(given.camera, reading), None, given.sigma_um / 1000
-    for table, findings in reading.named(("table",)):
-        sightings = keys.read_sightings(table, given.unit, given.angles, sigma, given.measured, findings)
-    measured = reading.complete(sightings)
+    camera, sigma = keys.only_camera(given.camera, reading), given.sigma_um / 1000
+    read = partial(keys.read_sightings, unit=given.unit, angles=given.angles, sigma=sigma, theodolite=given.measured)
+    measured = reading.complete(reading.table(("table",), read))
     oriented = orient(measured, camera.principal_distance, camera.principal_point, given.settings)
     return directions.orientation_sheet(camera, measured, oriented, given.settings, given.angles), reading
 
 
 def _one_station(path: Path | None, assignments: Sequence[str]) -> tuple[Sheet, Reading]:
     given, reading = read_keys(keys.OneStationFile, path, assignments)
-    camera, measured = keys.only_camera(given.camera, reading), None
-    for table, findings in reading.named(("table",)):
-        measured = keys.read_one_station(table, given, camera, findings)
-    points = reading.complete(measured)
+    camera = keys.only_camera(given.camera, reading)
+    points = reading.complete(reading.table(("table",), partial(keys.read_one_station, given=given, camera=camera)))
     moved = one_station(points, camera.principal_distance, given.attitude.rotation, given.significance)
     return displacements.one_station_sheet(points, moved, camera, given.attitude, given.significance), reading

@@ -29,12 +29,11 @@ from photostrip.pipeline.inputs import (
     BUNDLE,
     Inputs,
     MeasuredModels,
-    Strip,
     require_measured,
     require_named,
     require_whole,
 )
-from photostrip.points import PhotoPoints, locate
+from photostrip.points import locate
 from photostrip.project.loading import Project, read_project
 from photostrip.project.reading import fault_at, key_path
 from photostrip.project.tables import Tables, rays
@@ -84,8 +83,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
     used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
-    faults += _neighbours(project) if models is None else links_of_models(project, models)
-    faults += [] if models is not None else _alone(project)
+    faults += [*_neighbours(project), *_alone(project)] if models is None else links_of_models(project, models)
     # strips of a block may hang on others, or on cameras
     hung = len(inputs.strips) > 1 or inputs.positions is not None or inputs.orientations is not None
     if project.settings.adjustment != BUNDLE and not (project.settings.together and models is None and hung):
@@ -157,34 +155,32 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     return notes
 
 
-def _common(strip: Strip, observations: PhotoPoints) -> list[Numbers]:
-    """Count the points that each photo of a strip has in common with the next, and with the next two."""
-    place, width = strip.positions(observations), len(strip.photos) + 2
-    key = np.unique((observations.point * width + place)[place >= 0])  # on the next photo it is larger by one
-    on_next = np.diff(key, append=-1) == 1
-    rows = on_next, on_next & np.append(on_next[1:], [False])
-    return [np.bincount(key[some] % width, minlength=width) for some in rows]
+def _neighbours(project: Project) -> Iterator[Fault]:
+    """Refuse neighbouring photos with too few common points to be oriented, and three without one that carries scale.
 
-
-def _neighbours(project: Project) -> list[Fault]:
-    """Refuse neighbouring photos that cannot be oriented, or whose models cannot be joined."""
-    common = [_common(strip, project.inputs.observations) for strip in project.inputs.strips]
-    of_two, of_three = zip(*common, strict=True) if common else ((), ())
-    return [*_pairs(project, of_two), *_junctions(project, of_three)]
-
-
-def _pairs(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
-    """Refuse neighbouring photos with too few common points for their relative orientation."""
+    Points in common are counted from each photo on: with the next, and with the next two.
+    """
     from photostrip.strip.relative_orientation import MINIMUM_POINTS
 
-    for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
-        for j in np.flatnonzero(count[: len(strip.photos) - 1] < MINIMUM_POINTS).tolist():
-            left, right = strip.photos[j : j + 2]
-            message = f"photos {left} and {right} have {counted(int(count[j]), 'point')} in common"
-            fix = "measure more, or correct the order of the photos"
-            expected = f"at least {MINIMUM_POINTS}, better 12"
+    seen = project.inputs.observations
+    for i, strip in enumerate(project.inputs.strips):
+        photos, place, width = strip.photos, strip.positions(seen), len(strip.photos) + 2
+        key = np.unique((seen.point * width + place)[place >= 0])  # on the next photo it is larger by one
+        on_next = np.diff(key, append=-1) == 1
+        of_two, of_three = (
+            np.bincount(key[rows] % width, minlength=width)
+            for rows in (on_next, on_next & np.append(on_next[1:], False))
+        )
+        for j in np.flatnonzero(of_two[: len(photos) - 1] < MINIMUM_POINTS).tolist():
+            message = f"photos {photos[j]} and {photos[j + 1]} have {counted(int(of_two[j]), 'point')} in common"
+            fix, expected = "measure more, or correct the order of the photos", f"at least {MINIMUM_POINTS}, better 12"
             path = ("strips", i, "photos", j + 1)
             yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
+        for j in np.flatnonzero(of_three[: max(len(photos) - 2, 0)] == 0).tolist():
+            names = photos[j : j + 3]
+            message = f"no point is common to photos {', '.join(names[:2])} and {names[2]}: nothing carries the scale"
+            fix = "measure at least one pass point on all three"
+            yield fault_at(project.tree, ("strips", i, "photos", j + 1), message, "broken-joint", fix=fix)
 
 
 def _alone(project: Project) -> Iterator[Fault]:
@@ -203,16 +199,6 @@ def _alone(project: Project) -> Iterator[Fault]:
         fix = "measure more, or give its orientation roughly (orientations, role: approximate)"
         expected = f"at least {LEAST_SHARED}, better 12"
         yield fault_at(project.tree, ("photos",), message, "photo-not-tied", expected=expected, fix=fix)
-
-
-def _junctions(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
-    """Refuse three photos in a row without a common point: nothing would carry the scale on."""
-    for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
-        for j in np.flatnonzero(count[: max(len(strip.photos) - 2, 0)] == 0).tolist():
-            names = strip.photos[j : j + 3]
-            message = f"no point is common to photos {', '.join(names[:2])} and {names[2]}: nothing carries the scale"
-            fix = "measure at least one pass point on all three"
-            yield fault_at(project.tree, ("strips", i, "photos", j + 1), message, "broken-joint", fix=fix)
 
 
 def _control_of_strips(project: Project, used: Numbers) -> Iterator[Fault]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -29,9 +29,11 @@ from photostrip.project.keys import (
     Control,
     Distortion,
     Ellipsoid,
+    FiducialMeasurements,
     FirstPhoto,
     GivenAngles,
     GivenList,
+    Observations,
     Orientations,
     Output,
     PixelCamera,
@@ -56,16 +58,6 @@ _NUMBERED = re.compile(r"([^0-9]*)([0-9]*)")
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
 AHEAD = about(0, np.pi / 2.0)  # of image axes: a camera that looked down looks ahead
 PIXELS = "px"
-
-
-@dataclass(frozen=True)
-class ImageSystem:
-    """Unit, direction and origin of measured image coordinates."""
-
-    unit: str  # ``mm``, ``um``, ``0.1um`` or ``px``
-    y_axis: str  # ``up`` or ``down``
-    origin: str  # ``center``, ``top-left`` or ``first-pixel``
-    sigma: float | None
 
 
 def cameras(project: ProjectFile) -> dict[str, camera.Camera]:
@@ -173,21 +165,28 @@ def _first_photo(given: FirstPhoto | None) -> formed_strip.FirstPhoto:
     return formed_strip.FirstPhoto(rotation, given.base)
 
 
-def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, camera.Camera]) -> PhotoPoints:
-    """Bring measured image coordinates into millimetres, x to the right, y up.
+def photo_points(
+    read: Measurements | None,
+    given: Observations | FiducialMeasurements | None,
+    photos: Mapping[str, camera.Camera],
+) -> PhotoPoints | None:
+    """Bring measured image coordinates into millimetres, x to the right, y up, the origin in the middle of the photo.
 
-    The origin is the middle of the photo, unless `system` has its own. Rows of other photos than `photos` are left out.
+    That of measured fiducial marks is where it is. Rows of other photos than `photos` are left out.
     """
+    if read is None or given is None:
+        return None
+    unit, origin = given.unit or "mm", (given.origin if isinstance(given, Observations) else None) or "center"
     known = np.array([name in photos for name in read.photo_ids], bool)
     rows = slice(None) if known.all() else np.flatnonzero(known[read.photo])
     owners = [photos.get(name) for name in read.photo_ids]
-    scale = _per_photo([_millimetres(system.unit, each) for each in owners], read, rows)
-    sigma = _filled(read.sigma[rows], system.sigma)
+    scale = _per_photo([_millimetres(unit, each) for each in owners], read, rows)
+    sigma = _filled(read.sigma[rows], given.sigma)
     xy = _scaled(read.xy[rows], scale)
-    if system.y_axis == "down":
+    if given.y_axis == "down":
         xy[:, 1] = -xy[:, 1]
-    if system.origin != "center":
-        half = system.origin == "first-pixel"
+    if origin != "center":
+        half = origin == "first-pixel"
         xy += _per_photo([_corner(each, half_pixel=half) for each in owners], read, rows)
     affinity = [(0.0, 0.0) if each is None else each.pixel_affinity for each in owners]
     if np.any(affinity):
@@ -292,27 +291,27 @@ def control_points(tables: Sequence[ControlTable], lists: Sequence[Control]) -> 
 
 
 def _control_points(read: ControlTable, given: Control, number: int) -> ControlPoints:
-    """Return the used points of one list, in the internal order of axes."""
-    rows, columns = np.flatnonzero(read.used), _columns(frame_spec(given))
-    return ControlPoints(
-        ids=tuple(read.ids[row] for row in rows),
-        enu=read.xyz[rows][:, columns],
-        use=read.use[rows][:, columns],
-        check=read.check[rows],
-        sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
-        frame=np.full(len(rows), number, np.intp),
-    )
+    rows = np.flatnonzero(read.used)
+    ids, enu, sigma = _placed(read, given, rows)
+    use, check = read.use[rows][:, ground_columns(given)], read.check[rows]
+    return ControlPoints(ids=ids, enu=enu, use=use, check=check, sigma=sigma, frame=np.full(len(rows), number, np.intp))
 
 
 def ground_columns(given: GivenList) -> list[int]:
     """Which of the columns x, y, z of a list is east, which north, which up (or X, Y, Z)."""
-    return _columns(frame_spec(given))
+    axes = frame_spec(given).axes
+    return [axes.index(name) for name in (CARTESIAN_AXES if "x" in axes else GROUND_AXES)]
 
 
-def _columns(spec: FrameSpec) -> list[int]:
-    """Which of the columns x, y, z is east, which north, which up (or X, Y, Z)."""
-    names = CARTESIAN_AXES if "x" in spec.axes else GROUND_AXES
-    return [spec.axes.index(name) for name in names]
+def _placed(
+    read: ControlTable | PositionTable | OrientationTable,
+    given: Control | PositionsBlock | Orientations,
+    rows: Numbers,
+) -> tuple[tuple[str, ...], Floats, Floats]:
+    """Return ids, coordinates and standard deviations of some rows of a list, in the internal order of axes."""
+    columns = ground_columns(given)
+    sigma = _filled(read.sigma[rows], given.sigma)[:, columns]
+    return tuple(read.ids[row] for row in rows), read.xyz[rows][:, columns], sigma
 
 
 def camera_positions(
@@ -322,14 +321,13 @@ def camera_positions(
     if read is None or given is None:
         return None
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos and read.used[row]], np.intp)
-    spec = frame_spec(given)
-    columns = _columns(spec)
+    ids, enu, sigma = _placed(read, given, rows)
     return CameraPositions(
-        photos=tuple(read.ids[row] for row in rows),
-        frame=spec,
-        enu=read.xyz[rows][:, columns],
-        use=read.use[rows][:, columns],
-        sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
+        photos=ids,
+        frame=frame_spec(given),
+        enu=enu,
+        use=read.use[rows][:, ground_columns(given)],
+        sigma=sigma,
         time=read.time[rows],
         lever_arm=given.lever_arm,
         correction=given.correction,
@@ -350,23 +348,18 @@ def given_orientations(
     if read is None or given is None:
         return None
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos], np.intp)
-    spec = frame_spec(given)
-    columns, radians = _columns(spec), RADIANS[given.angles.unit]
-    ids, enu = tuple(read.ids[row] for row in rows), read.xyz[rows][:, columns]
-    values, north = read.angles[rows], None
-    if given.angles.system not in ROTATIONS:
-        values = values * radians
-    if given.angles.north == "true":
-        north = norths(ids, enu, frames[spec])
-    sigma = _filled(read.sigma_angles[rows], given.sigma_angles) * radians
-    found = attitudes(values, sigma, given.angles, north)
+    spec, radians = frame_spec(given), RADIANS[given.angles.unit]
+    ids, enu, sigma = _placed(read, given, rows)
+    values = read.angles[rows] * (1.0 if given.angles.system in ROTATIONS else radians)
+    north = norths(ids, enu, frames[spec]) if given.angles.north == "true" else None
+    found = attitudes(values, _filled(read.sigma_angles[rows], given.sigma_angles) * radians, given.angles, north)
     return GivenOrientations(
         photos=ids,
         frame=spec,
         enu=enu,
         angles=found.angles,
         system=found.system,
-        sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
+        sigma=sigma,
         sigma_turns=found.sigma_turns,
         observed=given.role == "observed",
         stated=found.stated,

@@ -5,6 +5,7 @@ Defaults of `processing` are those of the settings beside the mathematics; none 
 
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Annotated, Any
 
@@ -45,6 +46,7 @@ from photostrip.project.sections import (
     PositiveOrAuto,
     Range,
     Read,
+    Refusals,
     SchemaNumber,
     Section,
     Sigma3,
@@ -59,7 +61,6 @@ from photostrip.project.sections import (
     length,
     quoted,
     read_positive,
-    rule,
     single,
     text,
     whole,
@@ -134,11 +135,10 @@ class TableFile(Section):
         "Lines above the table that are passed over", 0
     )
 
-    @rule
-    def _commas_mean_one_thing(self) -> None:
+    def rules(self) -> Refusals:
         if self.decimal == self.separator:
             message = "commas cannot stand between the fields and before decimals"
-            raise wrong(message, at="decimal", fix="say the `separator`: semicolon, tab or blank")
+            yield wrong(message, at="decimal", fix="say the `separator`: semicolon, tab or blank")
 
 
 Unit = Annotated[str, choice("mm", "um", "0.1um", "px")]
@@ -248,12 +248,11 @@ class GivenList(TableFile):
     epoch: Positive | None = EPOCH
     ellipsoid: Ellipsoid | None = ELLIPSOID
 
-    @rule
-    def _axes_are_given(self) -> None:
+    def rules(self) -> Refusals:
         if self.axes is None and self.crs != "geocentric":
             expected = "axes: [east, north, up], or [north, east, up] where x points north"
             message = "nothing says which of the columns x, y, z is east"
-            raise wrong(message, code="missing-key", at="axes", expected=expected)
+            yield wrong(message, code="missing-key", at="axes", expected=expected)
 
 
 class Control(GivenList):
@@ -267,11 +266,10 @@ class Control(GivenList):
         None,
     )
 
-    @rule
-    def _zones_are_local(self) -> None:
+    def rules(self) -> Refusals:
         if self.other_zone and self.crs != "local":
             message = "zones of a known projection are tied by their formulas"
-            raise wrong(message, at="other_zone", fix="remove it")
+            yield wrong(message, at="other_zone", fix="remove it")
 
 
 class CameraPositions(GivenList):
@@ -328,17 +326,16 @@ class GivenAngles(Section):
         None,
     )
 
-    @rule
-    def _conventions_are_said(self) -> None:
+    def rules(self) -> Refusals:
         needed = ("rotates", "y_axis") if self.system in ROTATIONS else ("looks",) if self.system == YAW else ()
         for name in ("looks", "rotates", "y_axis"):
             given = getattr(self, name)
             if name in needed and given is None:
                 expected = type(self).model_fields[name].description or "".partition(": ")[2]
                 message = f"`{name}` is missing, which nothing else says of {self.system}"
-                raise wrong(message, code="missing-key", at=name, expected=expected)
+                yield wrong(message, code="missing-key", at=name, expected=expected)
             if name not in needed and given is not None:
-                raise wrong(f"`{name}` says nothing of {self.system}", at=name, fix="remove it")
+                yield wrong(f"`{name}` says nothing of {self.system}", at=name, fix="remove it")
 
 
 class Orientations(GivenList):
@@ -360,11 +357,10 @@ class Orientations(GivenList):
         unit="the angles' unit",
     )
 
-    @rule
-    def _true_north_is_somewhere(self) -> None:
+    def rules(self) -> Refusals:
         if self.angles.north == "true" and self.crs in {"local", "geocentric"}:
             message = f"nothing says where true north is in the frame `{self.crs}`"
-            raise wrong(message, at="angles", fix="give the crs of a map, or of longitude and latitude")
+            yield wrong(message, at="angles", fix="give the crs of a map, or of longitude and latitude")
 
 
 class Output(Section):
@@ -419,20 +415,16 @@ class Distortion(Section):
     radius: list[Number] = key("Radial table: ascending distances from the principal point", [], unit="mm")
     distortion: list[Number] = key("Radial table: distortion at these distances, outwards positive", [], unit="mm")
 
-    @rule
-    def _one_model(self) -> None:
+    def rules(self) -> Refusals:
         table = self.model == "radial-table"
         for name in ("k", "p", "b") if table else ("radius", "distortion"):
             if name in self.model_fields_set:
-                raise wrong(f"`{name}` does not belong to model {self.model}", at=name, fix="remove it or change model")
-        if not table:
-            return
-        if len(self.radius) < 2 or len(self.radius) != len(self.distortion):
+                yield wrong(f"`{name}` does not belong to model {self.model}", at=name, fix="remove it or change model")
+        if table and (len(self.radius) < 2 or len(self.radius) != len(self.distortion)):
             message = f"{len(self.radius)} radii and {len(self.distortion)} values of distortion are given"
-            raise wrong(message, at="distortion", expected="as many values as radii, at least two")
-        steps = zip(self.radius, self.radius[1:], strict=False)
-        if self.radius[0] < 0 or any(after <= before for before, after in steps):
-            raise wrong("the radii do not ascend", at="radius", expected="distances from 0 upwards")
+            yield wrong(message, at="distortion", expected="as many values as radii, at least two")
+        elif table and (self.radius[0] < 0 or any(after <= before for before, after in pairwise(self.radius))):
+            yield wrong("the radii do not ascend", at="radius", expected="distances from 0 upwards")
 
 
 class CertifiedDistortion(Distortion):
@@ -440,13 +432,12 @@ class CertifiedDistortion(Distortion):
 
     k0: Number = key("`brown`: the radial coefficient k0 of USGS, D = X k0: part of the principal distance", 0.0)
 
-    @rule
-    def _k0_scales_the_image(self) -> None:
+    def rules(self) -> Refusals:
         if self.k0 and self.model != "brown":
-            raise wrong(f"`k0` does not belong to model {self.model}", at="k0", fix="remove it or change model")
+            yield wrong(f"`k0` does not belong to model {self.model}", at="k0", fix="remove it or change model")
         if not abs(self.k0) < 1.0:
             message = f"{self.k0:g} is out of range"
-            raise wrong(message, code="range", at="k0", expected="a number near 0, as 1.2e-4, without unit")
+            yield wrong(message, code="range", at="k0", expected="a number near 0, as 1.2e-4, without unit")
 
 
 Focal = Annotated[
@@ -479,13 +470,12 @@ class PixelCamera(Section):
         None,
     )
 
-    @rule
-    def _coefficients_have_counterparts(self) -> None:
+    def rules(self) -> Refusals:
         try:
             self.in_millimetres("")
         except InputError as error:
             fault = error.faults[0]
-            raise wrong(fault.message, code=fault.code, at="distortion", fix=fault.fix) from None
+            yield wrong(fault.message, code=fault.code, at="distortion", fix=fault.fix)
 
     def in_millimetres(self, name: str) -> camera.Camera:
         """Return the camera as the program computes with it."""
@@ -522,15 +512,14 @@ class Camera(Section):
         None,
     )
 
-    @rule
-    def _marks_have_a_place(self) -> None:
+    def rules(self) -> Refusals:
         if self.fiducial_places and (self.fiducials or not self.fiducial_distances):
             message = "places of fiducial marks are for distances between them without coordinates"
-            raise wrong(message, at="fiducial_places", fix="remove them, or give fiducial_distances and no fiducials")
+            yield wrong(message, at="fiducial_places", fix="remove them, or give fiducial_distances and no fiducials")
         if self.fiducial_distances and not (self.fiducials or self.fiducial_places):
             message = "distances alone do not say which mark is where"
             fix = "give fiducial_places: {F1: bottom-right, ...}, or nominal coordinates in fiducials"
-            raise wrong(message, at="fiducial_distances", fix=fix)
+            yield wrong(message, at="fiducial_distances", fix=fix)
 
 
 def _unit(value: object) -> str:
@@ -656,13 +645,12 @@ class Bundle(Section):
         unit="mm, mm^-2 for k1 and so on; 1 for affinity and shear",
     )
 
-    @rule
-    def _known_parameters(self) -> None:
+    def rules(self) -> Refusals:
         for name in self.calibration_sigma:
             if name not in ASKED:
                 message = f"`{shown(name)}` is no parameter of a camera"
                 expected, fix = f"one of {', '.join(ASKED)}", suggestion(name, ASKED)
-                raise wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
+                yield wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
 
 
 Latitude = Annotated[Number, Range(-90.0, 90.0, "deg")]
@@ -739,11 +727,10 @@ class Processing(Section):
     )
     interior: Interior = key("Interior orientation", Interior())
 
-    @rule
-    def _azimuth_of_a_place(self) -> None:
+    def rules(self) -> Refusals:
         if self.earth_azimuth is not None and self.earth_latitude is None:
             message = "a direction has a radius of curvature at a latitude only"
-            raise wrong(message, code="missing-key", at="earth_azimuth", fix="give `earth_latitude` as well")
+            yield wrong(message, code="missing-key", at="earth_azimuth", fix="give `earth_latitude` as well")
 
 
 GEOPACKAGE = "geopackage"
@@ -872,12 +859,11 @@ class ProjectFile(Section):
         [],
     )
 
-    @rule
-    def _models_have_no_oriented_photos(self) -> None:
+    def rules(self) -> Refusals:
         for name in self.export:
             if self.models is not None and form_of(name) != GEOPACKAGE:
                 message = f"independent models give no orientation of photos, which {name} is made of"
-                raise wrong(message, code="export", at="export", fix="remove it; a GeoPackage (.gpkg) can be written")
+                yield wrong(message, code="export", at="export", fix="remove it; a GeoPackage (.gpkg) can be written")
 
     @property
     def camera_of(self) -> dict[str, str | None]:

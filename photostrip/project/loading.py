@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import Numbers
-from photostrip.camera import Camera
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.faults import Findings
 from photostrip.formats.files import current, seen_from
@@ -23,7 +22,7 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.frames import TiedFrames
-from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
 from photostrip.project.conversion import with_pixel_sizes
@@ -335,23 +334,24 @@ def _inputs(
     known, derived = with_pixel_sizes(project, tables.fiducials, conversion.cameras(project), root)
     photos = {photo: known[camera] for photo, camera in project.camera_of.items() if camera}
     control = [read for read in tables.control if read is not None]
-    if len(control) != len(project.control):
+    models = measured_models(tables.models, project.models, project.strips, placed_models)
+    measured = conversion.photo_points(tables.observations, project.observations, photos)
+    if models is not None:
+        measured = PhotoPoints.naming(models.points.point_ids)
+    if measured is None or len(control) != len(project.control):
         raise InputError("a table of the project is missing")
     control, joined = in_one_zone(control, project.control, root)
     frames = tuple(conversion.frame_spec(each) for each in project.control)
     first = conversion.first_frame(project)
     output = conversion.output_spec(project.output, first)
-    models = _models(project, tables, placed_models)
     inputs = Inputs(
         name=str(project.name),
         strips=conversion.strips(project, known) if models is None else (),
-        observations=_observations(project, tables, photos)
-        if models is None
-        else PhotoPoints.naming(models.points.point_ids),
+        observations=measured,
         control=conversion.control_points(control, project.control),
         frames=frames,
         output=(output or first) if not frames else None if output == first else output,
-        fiducials=_fiducials(project, tables, photos),
+        fiducials=conversion.photo_points(tables.fiducials, project.fiducial_measurements, photos),
         positions=conversion.camera_positions(tables.positions, project.camera_positions, photos),
         orientations=conversion.given_orientations(tables.orientations, project.orientations, photos, frames_of),
         models=models,
@@ -373,35 +373,3 @@ def _from_true_north(
     )
     path = ("orientations", "angles", "north")
     yield root.place_of(path).note("true-north", message, key=".".join(path))
-
-
-def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:
-    """Image points of the photos of the strips."""
-    given = project.observations
-    if given is None or tables.observations is None:
-        raise InputError("a table of the project is missing")
-    system = conversion.ImageSystem(
-        unit=given.unit, y_axis=given.y_axis or "up", origin=given.origin or "center", sigma=given.sigma
-    )
-    return conversion.photo_points(tables.observations, system, photos)
-
-
-def _models(project: ProjectFile, tables: Tables, placed_models: Mapping[int, Sequence[str]]) -> MeasuredModels | None:
-    """Model coordinates of the strips."""
-    if project.models is None or tables.models is None:
-        return None
-    flights = [
-        ModelStrip(str(strip.id), tuple(map(str, strip.photos)), tuple(placed_models[number]))
-        for number, strip in enumerate(project.strips)
-    ]
-    return measured_models(tables.models, project.models, flights)
-
-
-def _fiducials(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:
-    """Measured fiducial marks of the photos of the strips."""
-    given = project.fiducial_measurements
-    if given is None or tables.fiducials is None:
-        return None
-    unit = given.unit or (project.observations.unit if project.observations is not None else "mm")
-    system = conversion.ImageSystem(unit=unit, y_axis=given.y_axis or "up", origin="center", sigma=given.sigma)
-    return conversion.photo_points(tables.fiducials, system, photos)

@@ -33,6 +33,7 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    Refusals,
     SchemaNumber,
     Section,
     Triple,
@@ -41,7 +42,6 @@ from photostrip.project.sections import (
     choice,
     key,
     length,
-    rule,
     wrong,
 )
 from photostrip.project.simulation import SimulatedCamera, camera_of
@@ -96,10 +96,9 @@ class Flown(PlanFile):
     flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
     image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
 
-    @rule
-    def _one_scale(self) -> None:
+    def rules(self) -> Refusals:
         if self.scale is not None and self.flying_height is not None:
-            raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
+            yield wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
 
     def scale_of(self, camera: Camera) -> float:
         """Denominator of the photo scale, given itself or by the flying height."""
@@ -194,29 +193,24 @@ class ModelPlanFile(Flown):
         "no",
     )
 
-    @rule
-    def _errors_or_misclosures(self) -> None:
+    def rules(self) -> Refusals:
         measured = [point for point in self.control.points if point.misclosure is not None]
-        if not measured:
-            return
-        if len(measured) < len(self.control.points):
+        if measured and len(measured) < len(self.control.points):
             message = "some control points have a misclosure, and others have none"
-            raise wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
+            yield wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
         every: list[ModelPoint] = [*self.control.points, *self.points]
         made = [point for point in every if any(point.measured_error)]
-        if made or any(any(point.given_error) for point in measured) or any(dict(self.element_errors).values()):
+        made += [point for point in measured if any(point.given_error)]
+        if measured and (made or any(dict(self.element_errors).values())):
             message = "misclosures that were found, and errors that would make some, are both given"
-            raise wrong(message, code="two-keys", at="control", fix="remove the one or the other")
-
-    @rule
-    def _points_are_seen(self) -> None:
+            yield wrong(message, code="two-keys", at="control", fix="remove the one or the other")
         camera = camera_of(self.camera)
         flying_height = self.scale_of(camera) * camera.principal_distance / MILLIMETRES
         for name, points in (("control", self.control.points), ("points", self.points)):
             highest = max((point.height for point in points), default=0.0)
             if highest > RELIEF * flying_height:
                 message = f"a point {highest:g} m high is not seen from {flying_height:g} m"
-                raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
+                yield wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
 
     @property
     def spec(self) -> ModelSpec:
@@ -312,10 +306,9 @@ class StripLayout(Section):
     )
     gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
 
-    @rule
-    def _one_way_to_space_bands(self) -> None:
+    def rules(self) -> Refusals:
         if self.every is not None and "bands" in self.model_fields_set:
-            raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
+            yield wrong("the number of bands and their distance are both given", at="every", fix="remove one")
 
     def named(self, name: str, sigma: tuple[float, float, float]) -> ControlLayout:
         given = dict(self)
@@ -367,18 +360,17 @@ class StripPlanFile(Flown):
     )
     place: StripPlacement | None = key("Further points to be placed as well as possible", None)
 
-    @rule
-    def _names_and_methods_fit(self) -> None:
+    def rules(self) -> Refusals:
         into = self.place.into if self.place is not None else None
         names = list(self.layouts or DEFAULT_LAYOUTS)
         if into is not None and into not in names:
             message = f"there is no layout `{into}` that points could be added to"
             fix = suggestion(into, names)
-            raise wrong(message, code="unknown-layout", at="place", expected=f"one of {', '.join(names)}", fix=fix)
+            yield wrong(message, code="unknown-layout", at="place", expected=f"one of {', '.join(names)}", fix=fix)
         measured = self.gnss is not None or any(each.gnss is not None for each in (self.layouts or {}).values())
         if measured and BUNDLE not in self.methods:
             message = "measured perspective centres are of use to the bundle alone, which is not among the methods"
-            raise wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
+            yield wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
 
     @property
     def design(self) -> DesignTask:
@@ -421,27 +413,23 @@ class PlanCamera(Section):
     base: Positive | None = key("Photo base; default: from `format` and the overlap", None, unit="mm")
     format: tuple[Positive, Positive] | None = key("Length along and width across the flight", None, unit="mm")
 
-    @rule
-    def _has_a_base(self) -> None:
+    def rules(self) -> Refusals:
         if self.base is None and self.format is None:
-            raise wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
-
-    @rule
-    def _has_one_precision(self) -> None:
+            yield wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
         if (self.sigma_um is None) == (self.image_sigma_um is None):
             what = "nothing says" if self.sigma_um is None else "two keys say"
             message = f"{what} how well an x parallax is known"
-            raise wrong(message, code="missing-key", expected="`sigma_um` or `image_sigma_um`")
+            yield wrong(message, code="missing-key", expected="`sigma_um` or `image_sigma_um`")
         left = [name for name in ("mean_distortion_um", "distortion") if getattr(self, name) is not None]
         if left and self.sigma_um is not None:
             message = f"`{left[0]}` adds to the errors of measuring, and `sigma_um` has all errors in it"
-            raise wrong(message, code="two-keys", at=left[0], fix="give `image_sigma_um` instead of `sigma_um`")
+            yield wrong(message, code="two-keys", at=left[0], fix="give `image_sigma_um` instead of `sigma_um`")
         if len(left) > 1:
             message = "the distortion that is left and its mean size are both given"
-            raise wrong(message, code="two-keys", at=left[0], fix="remove one")
+            yield wrong(message, code="two-keys", at=left[0], fix="remove one")
         if self.distortion is not None and self.format is None:
             message = "where the distortion lies in a model follows from the format, which is not given"
-            raise wrong(message, code="missing-key", at="distortion", expected="`format`")
+            yield wrong(message, code="missing-key", at="distortion", expected="`format`")
 
 
 class CameraPlanFile(PlanFile):
@@ -459,33 +447,29 @@ class CameraPlanFile(PlanFile):
     reference: Id | None = key("Camera that the others stand beside; default: the last", None)
     cameras: Annotated[dict[Id, PlanCamera], length(1)] = key("Cameras by name")
 
-    @rule
-    def _reference_is_there(self) -> None:
+    def rules(self) -> Refusals:
         if self.reference is not None and self.reference not in self.cameras:
             expected = f"one of {', '.join(self.cameras)}"
-            raise wrong(
+            yield wrong(
                 f"there is no camera `{self.reference}`", code="unknown-camera", at="reference", expected=expected
             )
         wide = [name for name, camera in self.cameras.items() if camera.format is not None]
         if wide and len(wide) < len(self.cameras):
             lacking = next(name for name in self.cameras if name not in wide)
             message = f"camera `{lacking}` has no format, and others have: areas cannot be compared"
-            raise wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
-
-    @rule
-    def _flown_one_way(self) -> None:
+            yield wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
         given = [name for name in FLIGHTS if getattr(self, name) is not None]
         if len(given) > 1:
-            raise wrong(f"`{given[0]}` and `{given[1]}` are both given", code="two-keys", at=given[1], fix="remove one")
+            yield wrong(f"`{given[0]}` and `{given[1]}` are both given", code="two-keys", at=given[1], fix="remove one")
         ground = [name for name in ("relief", "slope_deg") if getattr(self, name)]
         if ground and not given:
             message = "what a camera takes of a terrain depends on how it is flown"
-            raise wrong(
+            yield wrong(
                 message, code="missing-key", at=ground[0], expected="`scale`, `flying_height` or `height_sigma`"
             )
         if self.relief and any(camera.format is None for camera in self.cameras.values()):
             message = "how far photos overlap on high ground follows from their format, which is not given"
-            raise wrong(message, code="missing-key", at="relief", fix="give `format` for all cameras")
+            yield wrong(message, code="missing-key", at="relief", fix="give `format` for all cameras")
 
     @property
     def compared(self) -> tuple[ComparedCamera, ...]:
@@ -551,13 +535,12 @@ class DisplacementPlanFile(PlanFile):
         "Probability with which the displacements stated are found", DisplacementSpec.power
     )
 
-    @rule
-    def _one_precision(self) -> None:
+    def rules(self) -> Refusals:
         if self.sigma_um is not None and self.sigma_d_um is not None:
             message = "the standard deviation of a coordinate and that of a pseudo-parallax are both given"
-            raise wrong(message, code="two-keys", at="sigma_d_um", fix="remove one")
+            yield wrong(message, code="two-keys", at="sigma_d_um", fix="remove one")
         if self.stations == "1" and self.convergence_deg:
-            raise wrong("one camera has no other to be turned towards", at="convergence_deg", fix="remove it")
+            yield wrong("one camera has no other to be turned towards", at="convergence_deg", fix="remove it")
 
     def spec(self, reading: Reading) -> DisplacementSpec:
         """Return what is planned with a camera of a list, or raise why there is none."""
@@ -623,11 +606,10 @@ class ScreeningPlanFile(PlanFile):
         "Number that makes the drawn pairs and errors the same again", USUAL_SCREENING.seed
     )
 
-    @rule
-    def _errors_have_pairs(self) -> None:
+    def rules(self) -> Refusals:
         if self.second_errors > self.models:
             message = f"{self.second_errors} second errors do not go into {self.models} pairs"
-            raise wrong(message, code="range", at="second_errors", expected=f"0 to {self.models}")
+            yield wrong(message, code="range", at="second_errors", expected=f"0 to {self.models}")
 
     @property
     def spec(self) -> ScreeningSpec:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,7 +25,7 @@ from photostrip.formats.faults import number as read_number
 from photostrip.formats.files import BYTE_ORDER_MARK, MEGABYTE, decode, read_bytes
 from photostrip.formats.tables import WORDS, Form
 from photostrip.notes import Note, counted
-from photostrip.project.sections import Section, WrongValueError, bare, is_section, kinds_of, wrong
+from photostrip.project.sections import Section, WrongValueError, WrongValuesError, bare, is_section, kinds_of, wrong
 
 COMMAND_LINE = "--set"  # the place of values that the command line sets
 OVERRIDE = "override"  # the place of those that a script sets
@@ -446,33 +446,32 @@ class Reading:
         """Keep a fault of a value of the file."""
         self.findings.add(fault_at(self.root, path, message, code, expected=expected, fix=fix))
 
-    def named(self, key: KeyPath) -> Iterator[tuple[str, Findings]]:
-        """Return the path of the file that a key names, and findings for it; nothing where the key names none.
+    def table(self, key: KeyPath, read: Callable[[str, Findings], T | None]) -> T | None:
+        """Read the file that a key names; None where it names none, and where there are faults."""
+        return self.tables(key, lambda paths, inner: read(paths[0], inner)) if self.root.word(*key) else None
 
-        Faults of that file as a whole are reported where it is named, those without a file at their own key.
+    def tables(self, key: KeyPath, read: Callable[[list[str], Findings], T | None]) -> T | None:
+        """Read the same of a key that names one file or a list of them.
+
+        Faults of a file as a whole are reported where it is named, those without a file at their own key.
         """
-        if self.root.word(*key):
-            for paths, inner in self.named_together(key):
-                yield paths[0], inner
-
-    def named_together(self, key: KeyPath) -> Iterator[tuple[list[str], Findings]]:
-        """Return the same for a key that names one file or a list of them."""
         node = self.root.find(*key)
         if node is None:
-            return
+            return None
         nodes = {(*key, number): each for number, each in enumerate(node.elements)} or {key: node}
         named = {path_of(each, self.file): where for where, each in nodes.items() if each.text}
         if not named:
-            return
-        inner = Findings(self.findings.notes)
-        yield list(named), inner
+            return None
 
         def placed(fault: Fault) -> Fault:
             where = named.get(fault.file, key)
             return where_named(fault, self.root, where) if fault.file else at_own_key(fault, self.root)
 
+        inner = Findings(self.findings.notes)
+        found = read(list(named), inner)
         self.findings.absorb(inner, placed)
         self.files += [path for path in named if path not in self.files]
+        return found
 
     @contextmanager
     def places(self, keys: Mapping[str, str] | None = None) -> Iterator[None]:
@@ -629,7 +628,8 @@ def checked(kind: type[S], root: Node, findings: Findings) -> S | None:
         return kind.model_validate(root.plain)
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        findings.add(*_once(dict.fromkeys(_fault(kind, root, each) for each in problems[:MOST_EXPLAINED])))
+        told = (fault for each in problems[:MOST_EXPLAINED] for fault in _faults(kind, root, each))
+        findings.add(*_once(dict.fromkeys(told)))
         findings.count(root.place.file, len(problems[MOST_EXPLAINED:]))
         return None
 
@@ -657,23 +657,27 @@ def valid_section(kind: type[S], value: object) -> S | None:
         return None
 
 
-def _fault(kind: type[Section], root: Node, problem: Any) -> Fault:  # noqa: ANN401 (a mapping of pydantic)
+def _faults(kind: type[Section], root: Node, problem: Any) -> Iterator[Fault]:  # noqa: ANN401 (a mapping of pydantic)
     """Say what is wrong in the words of the user, with its place in the file."""
     path, owner = _followed(kind, root, problem["loc"])
     if get_origin(owner) is tuple and problem["type"] == "missing":  # one of its values; it has too few
         path = path[:-1]
-    error = _explained(problem, str(path[-1]) if path else "", owner)
-    at, fix = (*path, *error.at.split(".")) if error.at else path, error.fix
-    place = root.place_of(at)
-    if error.code == "unknown-key":
-        name, node = str(path[-1]), root.find(*path[:-1])
-        place = node.keys.get(name, place) if node is not None else place
-        if not fix and name in homes(kind):
-            fix = f"`{name}` belongs in `{homes(kind)[name]}`"
-    expected = "" if error.code == "unknown-key" and fix else error.expected
-    if error.code == "schema-number":
-        expected = f"{key_path(at)}: {expected}"
-    return place.fault(error.message, error.code, key=key_path(at), expected=expected, fix=fix)
+    if isinstance(together := problem.get("ctx", {}).get("error"), WrongValuesError):
+        errors = together.told
+    else:
+        errors = (_explained(problem, str(path[-1]) if path else "", owner),)
+    for error in errors:
+        at, fix, expected = (*path, *error.at.split(".")) if error.at else path, error.fix, error.expected
+        place = root.place_of(at)
+        if error.code == "unknown-key":
+            name, node = str(path[-1]), root.find(*path[:-1])
+            place = node.keys.get(name, place) if node is not None else place
+            if not fix and name in homes(kind):
+                fix = f"`{name}` belongs in `{homes(kind)[name]}`"
+            expected = "" if fix else expected
+        elif error.code == "schema-number":
+            expected = f"{key_path(at)}: {expected}"
+        yield place.fault(error.message, error.code, key=key_path(at), expected=expected, fix=fix)
 
 
 def _followed(kind: type[Section], root: Node, steps: KeyPath) -> tuple[KeyPath, Any]:

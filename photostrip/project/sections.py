@@ -6,10 +6,10 @@ is wrong; pydantic walks through sections, lists and mappings and collects every
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, model_validator
 from pydantic_core import core_schema
@@ -19,7 +19,6 @@ from photostrip.formats.faults import number as read_number
 from photostrip.formats.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 
-T = TypeVar("T", bound="Section")
 Before = BeforeValidator
 After = AfterValidator
 FALSE, TRUE = ("false", "no", "off"), ("true", "yes", "on")
@@ -38,6 +37,17 @@ class WrongValueError(ValueError):
     def __init__(self, message: str, *, code: str, expected: str, fix: str, at: str) -> None:
         super().__init__(message)
         self.message, self.code, self.expected, self.fix, self.at = message, code, expected, fix, at
+
+
+class WrongValuesError(ValueError):
+    """All that is wrong with the values of one section together."""
+
+    def __init__(self, told: tuple[WrongValueError, ...]) -> None:
+        super().__init__(told[0].message)
+        self.told = told
+
+
+Refusals = Iterator[WrongValueError]
 
 
 def wrong(message: str, *, code: str = "value", expected: str = "", fix: str = "", at: str = "") -> WrongValueError:
@@ -82,16 +92,6 @@ def key(description: str, default: Any = ..., *, unit: str = "") -> Any:  # noqa
     return Field(default, description=told, json_schema_extra={"unit": unit} if unit else None)
 
 
-def rule(check: Callable[[Any], None]) -> Any:  # noqa: ANN401 (what pydantic makes of it)
-    """Make a method of a section, which raises what is wrong with its values together, part of its reading."""
-
-    def kept(section: T) -> T:
-        check(section)
-        return section
-
-    return model_validator(mode="after")(kept)
-
-
 class Section(BaseModel):
     """A mapping of a file: unknown keys are faults. Its values do not change."""
 
@@ -102,6 +102,14 @@ class Section(BaseModel):
         return self.model_copy(update=values)
 
     _all_commented_out: ClassVar[Any] = model_validator(mode="before")(lambda value: {} if value == "" else value)
+
+    @model_validator(mode="after")
+    def _by_the_rules(self) -> Self:
+        """Refuse what is wrong with its values together: what ``rules(self)`` of its class and those above give."""
+        rules = [vars(kind)["rules"] for kind in reversed(type(self).__mro__) if "rules" in vars(kind)]
+        if told := tuple(each for given in rules for each in given(self)):
+            raise WrongValuesError(told)
+        return self
 
 
 def bare(annotation: Any) -> Any:  # noqa: ANN401 (a type)

@@ -230,31 +230,24 @@ def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specificati
 
 def _spec(given: SimulationFile) -> simulation.Spec:
     return simulation.Spec(
-        name=str(given.name),
-        seed=given.seed,
-        camera=camera_of(given.camera),
-        ground=simulation.Ground(**_fields(given.ground, ellipsoid=semi_axes(given.ground.ellipsoid))),
-        flight=simulation.Flight(**_fields(given.flight)),
-        terrain=simulation.Terrain(**_fields(given.terrain)),
-        points=simulation.Points(**_fields(given.points)),
-        control=simulation.Control(**_fields(given.control)),
-        image=simulation.Image(**_fields(given.image)),
-        film=None if given.film is None else simulation.Film(**_fields(given.film)),
-        refraction=given.refraction,
-        gross_errors=tuple(simulation.GrossError(**_fields(each)) for each in given.gross_errors),
-        gnss=None if given.gnss is None else simulation.Gnss(**_fields(given.gnss)),
-        models=None if given.models is None else simulation.Models(**_fields(given.models)),
+        **{name: _made(value) for name, value in given if name in simulation.Spec.__dataclass_fields__}
     )
 
 
-def _fields(section: Section, **others: object) -> dict[str, Any]:
-    """Values of a section by key, texts as plain texts, and others in place of its own."""
-    return {name: str(value) if isinstance(value, str) else value for name, value in section} | others
+def _made(value: Any) -> Any:  # noqa: ANN401 (any value of a specification)
+    """Return a section as what has its name in ``simulation``, with the same fields; values as they are."""
+    if isinstance(value, SimulatedCamera):
+        return camera_of(value)
+    if isinstance(value, Ellipsoid):
+        return semi_axes(value)
+    if isinstance(value, Section):
+        return getattr(simulation, type(value).__name__)(**{name: _made(each) for name, each in value})
+    return tuple(map(_made, value)) if isinstance(value, list) else value
 
 
 def camera_of(given: SimulatedCamera) -> camera.Camera:
     """Return the preset with what is said beside it."""
-    changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
+    changed = {name: value for name, value in given if value is not None and name != "preset"}
     if given.distortion is not None:
         changed["distortion"] = distortion_of(given.distortion)
     return replace(simulation.PRESETS[given.preset], **changed)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
 from photostrip.project.conversion import ground_columns
-from photostrip.project.keys import Control, Models
+from photostrip.project.keys import Control, Models, Strip
 from photostrip.project.reading import Node, Reading, fault_at, form_of
 from photostrip.project.references import ListedPhoto, listed_photos, marks_of
 
@@ -66,20 +67,6 @@ class ModelTables:
         for row in rows.tolist():
             found[read.model_ids[read.models[row]]][read.target_ids[read.targets[row]]] = row
         return found
-
-
-def model_tables(points: ModelTable | None, centers: ModelTable | None, root: Node) -> ModelTables | None:
-    """Put the tables together; None when one that the project names could not be read."""
-    named = root.has("models", "centers")
-    return None if points is None or (named and centers is None) else ModelTables(points, centers)
-
-
-def read_model_points(path: str, root: Node, findings: Findings, *, centers: bool) -> ModelTable | None:
-    """Read one of the two tables of model coordinates; the project says what rows without standard deviations get."""
-    where = ("models", "centers") if centers else ("models",)
-    node = root.find(*where)
-    has_sigma = root.has("models", "sigma") or (centers and root.has("models", "center_sigma"))
-    return read_models(path, findings, centers=centers, has_sigma=has_sigma, form=form_of(node))
 
 
 def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[int, tuple[str, ...]]:
@@ -182,8 +169,15 @@ def _as_listed(
             yield fault_at(root, (*path, place), message, "wrong-center", fix=fix)
 
 
-def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelStrip]) -> MeasuredModels:
-    """Bring the model coordinates of the strips into millimetres and right-handed axes."""
+def measured_models(
+    tables: ModelTables | None, given: Models | None, flights: Sequence[Strip], placed: Mapping[int, Sequence[str]]
+) -> MeasuredModels | None:
+    """Bring the model coordinates of the strips into millimetres and right-handed axes; `placed`: models of each."""
+    if tables is None or given is None:
+        return None
+    strips = [
+        ModelStrip(str(each.id), tuple(map(str, each.photos)), tuple(placed[n])) for n, each in enumerate(flights)
+    ]
     photos = [photo for strip in strips for photo in strip.photos]
     wanted = [model for strip in strips for model in strip.models]
     factor = MILLIMETRES[given.unit]
@@ -240,6 +234,7 @@ def _rows(read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Seque
     )
 
 
+T = TypeVar("T")
 LOOK_ALIKES = str.maketrans("авеѕіјкмнорстухoil", "abes1jkmh0pctyx011")  # after folding the case
 _ENDINGS = re.compile(r"(?im)\.(?:tiff?|jpe?g|png|jp2|img)$")
 _SIGNS = re.compile(r"[^\w\n]|_")
@@ -260,43 +255,58 @@ class Tables:
 
 def read_tables(reading: Reading) -> Tables:
     """Read every table that the project names, whether or not the rest of the project is right."""
-    root = reading.root
-    photos = frozenset(photo.id for photo in listed_photos(root))
-    observations = fiducials = positions = orientations = points = centers = None
-    for paths, findings in reading.named_together(("observations", "file")):
-        observations = read_measurements(paths, findings, _manner(root, "observations", photos))
-    for paths, findings in reading.named_together(("fiducial_measurements", "file")):
-        fiducials = read_measurements(paths, findings, _manner(root, "fiducial_measurements", photos))
-    control: list[ControlTable | None] = []
+    root, photos = reading.root, frozenset(photo.id for photo in listed_photos(reading.root))
+
+    def measured(section: str) -> Measurements | None:
+        return reading.tables(
+            (section, "file"), lambda paths, inner: read_measurements(paths, inner, _manner(root, section, photos))
+        )
+
+    observations, fiducials = measured("observations"), measured("fiducial_measurements")
     # an id is one text, in whichever tables it stands: those of check points take 60 bytes each
     known = {} if observations is None else dict(zip(observations.target_ids, observations.target_ids, strict=True))
-    for number, node in enumerate(root.list_at("control")):
-        control.append(None)
-        for path, findings in reading.named(("control", number, "file")):
-            up, form = _height_column(node), form_of(node)
-            read = read_control(path, up, findings, default_sigma=node.has("sigma"), form=form)
-            if read is not None:
-                control[-1] = replace(read, ids=[known.get(name, name) for name in read.ids])
+    control: list[ControlTable | None] = []
+    for number in range(len(root.list_at("control"))):
+        read = _given_list(reading, read_control, "control", number)
+        control.append(None if read is None else replace(read, ids=[known.get(name, name) for name in read.ids]))
     refuse_repeated(control, reading.findings)
-    for path, findings in reading.named(("camera_positions", "file")):
-        node = root.entries["camera_positions"]
-        up, form = _height_column(node), form_of(node)
-        positions = read_positions(path, up, findings, default_sigma=node.has("sigma"), form=form)
-    for path, findings in reading.named(("orientations", "file")):
-        orientations = _orientations(path, root.entries["orientations"], findings)
-    for path, findings in reading.named(("models", "file")):
-        points = read_model_points(path, root, findings, centers=False)
-    for path, findings in reading.named(("models", "centers", "file")):
-        centers = read_model_points(path, root, findings, centers=True)
-    models = model_tables(points, centers, root)
     return Tables(
         observations=observations,
         fiducials=fiducials,
         control=control,
-        positions=positions,
-        orientations=orientations,
-        models=models,
+        positions=_given_list(reading, read_positions, "camera_positions"),
+        orientations=reading.table(("orientations", "file"), partial(_orientations, root)),
+        models=_model_tables(reading),
     )
+
+
+def _given_list(reading: Reading, read: Callable[..., T | None], *where: str | int) -> T | None:
+    """Read a list of given coordinates as far as its block says how."""
+    node = reading.root.find(*where)
+    if node is None:
+        return None
+    axes = [each.text for each in node.list_at("axes")]
+    up = next((number for number, name in enumerate(axes[:3]) if name in {"up", "z"}), 2)  # column of the height
+    sigma, form = node.has("sigma"), form_of(node)
+    return reading.table((*where, "file"), lambda path, inner: read(path, up, inner, default_sigma=sigma, form=form))
+
+
+def _model_tables(reading: Reading) -> ModelTables | None:
+    """Read the tables of model coordinates; None when one that the project names could not be read."""
+    root = reading.root
+
+    def read(*where: str, has_sigma: bool) -> ModelTable | None:
+        form, centers = form_of(root.find(*where)), len(where) > 1
+        return reading.table(
+            (*where, "file"),
+            lambda path, inner: read_models(path, inner, centers=centers, has_sigma=has_sigma, form=form),
+        )
+
+    sigma = root.has("models", "sigma")
+    points = read("models", has_sigma=sigma)
+    centers = read("models", "centers", has_sigma=sigma or root.has("models", "center_sigma"))
+    named = root.has("models", "centers")
+    return None if points is None or (named and centers is None) else ModelTables(points, centers)
 
 
 def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
@@ -319,8 +329,9 @@ def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
     )
 
 
-def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable | None:
+def _orientations(root: Node, path: str, findings: Findings) -> OrientationTable | None:
     """Read given orientations by the names of their angles; nothing when the system is not known, which is reported."""
+    node = root.entries["orientations"]
     system = node.word("angles", "system") or SYSTEMS[0]
     if system not in (*SYSTEMS, *ROTATIONS):
         return None
@@ -328,12 +339,6 @@ def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable
     needs = observed and not node.has("sigma"), observed and not node.has("sigma_angles")
     unit, form = node.word("angles", "unit") or "deg", form_of(node)
     return read_orientations(path, system, unit, findings, needs_sigma=needs, form=form)
-
-
-def _height_column(node: Node) -> int:
-    """Which of the columns x, y, z is the height, as far as the axes say it."""
-    axes = [each.text for each in node.list_at("axes")]
-    return next((number for number, name in enumerate(axes[:3]) if name in {"up", "z"}), 2)
 
 
 def check_tables(root: Node, tables: Tables) -> Iterator[Fault]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -32,6 +33,7 @@ from photostrip.project.sections import (
     Pair,
     Positive,
     Range,
+    Refusals,
     SchemaNumber,
     Section,
     Whole,
@@ -40,7 +42,6 @@ from photostrip.project.sections import (
     choice,
     key,
     length,
-    rule,
     wrong,
 )
 from photostrip.terrestrial.accuracy import Theodolite
@@ -140,11 +141,10 @@ class Camera(Section):
     )
     format: tuple[Width, Width] | None = key("Width and height of the field of measurement", None, unit="mm")
 
-    @rule
-    def _has_a_principal_distance(self) -> None:
+    def rules(self) -> Refusals:
         if self.preset is None and self.principal_distance is None:
             expected = "`preset`, or `principal_distance` in mm"
-            raise wrong("nothing says what the camera is", code="missing-key", expected=expected)
+            yield wrong("nothing says what the camera is", code="missing-key", expected=expected)
 
 
 def _named(value: object) -> object:
@@ -161,8 +161,8 @@ def known_presets(reading: Reading | None = None) -> dict[str, Phototheodolite]:
     text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
     known = _listed(parse(text, OWN_LIST, findings), findings)
     if reading is not None:
-        for path, inner in reading.named(("presets",)):
-            known |= _listed(read_document(path, inner), reading.findings)
+        root = reading.table(("presets",), read_document)
+        known |= _listed(root, reading.findings)
     return known
 
 
@@ -230,12 +230,15 @@ class Turned(Section):
         """Whether the optical axis and the photo's x axis are horizontal."""
         return self.omega == 0 and self.kappa == 0
 
-    def attitude_in(self, angles: str, at: str = "") -> Attitude:
-        """Return the attitude; `angles`: their unit. Raises a fault, of a key under `at`, where it has no azimuth."""
-        unit = RADIANS[angles]
-        if abs(np.cos(self.omega * unit)) < GIMBAL:
+    def vertical(self, angles: str, at: str = "") -> Refusals:
+        """Refuse an attitude that has no azimuth; `angles`: their unit, `at`: above its keys."""
+        if abs(np.cos(self.omega * RADIANS[angles])) < GIMBAL:
             message = f"with {self.omega:g} {angles} the camera looks straight up or down, and has no azimuth"
-            raise wrong(message, code="range", at=f"{at}omega", expected="an elevation below 90 degrees")
+            yield wrong(message, code="range", at=f"{at}omega", expected="an elevation below 90 degrees")
+
+    def attitude_in(self, angles: str) -> Attitude:
+        """Return the attitude; `angles`: their unit."""
+        unit = RADIANS[angles]
         turned = (self.alpha * unit, self.omega * unit, self.kappa * unit)
         return Attitude(turned, ground_from_photo(*turned), angles)
 
@@ -243,9 +246,8 @@ class Turned(Section):
 class Looking(WithCamera, Turned):
     """A camera and where it looks."""
 
-    @rule
-    def _has_an_azimuth(self) -> None:
-        self.attitude_in(self.angles)
+    def rules(self) -> Refusals:
+        return self.vertical(self.angles)
 
     @property
     def attitude(self) -> Attitude:
@@ -258,11 +260,10 @@ class Pointed(Looking):
     table: Words | None = key("Table `point,x,z` or `point,lambda,beta`, .csv or .csv.gz", None)
     at: list[Pair] = key("Points instead of a table: [[x, z]] or [[lambda, beta]]", [])
 
-    @rule
-    def _one_source(self) -> None:
+    def rules(self) -> Refusals:
         if (self.table is None) == (not self.at):
             message = "points are given twice, in `table` and with `at`" if self.at else "no points are given"
-            raise wrong(message, code="no-points", expected="`table` or `at`")
+            yield wrong(message, code="no-points", expected="`table` or `at`")
 
 
 class DirectionsFile(Pointed):
@@ -298,16 +299,12 @@ class AccuracyFile(OverPhoto):
         """Attitudes at both ends of the base; one where they are the same."""
         return [self.attitude] if self.right is None else [self.attitude, self.right.attitude_in(self.angles)]
 
-    @rule
-    def _right_end_has_an_azimuth(self) -> None:
+    def rules(self) -> Refusals:
         if self.right is not None:
-            self.right.attitude_in(self.angles, "right.")
-
-    @rule
-    def _printed_for_a_level_camera(self) -> None:
+            yield from self.right.vertical(self.angles, "right.")
         if self.as_printed and not self.both_level:
             message = "the printed formulas hold for a level camera"
-            raise wrong(message, code="as-printed", at="as_printed", fix="leave out `omega` and `kappa`")
+            yield wrong(message, code="as-printed", at="as_printed", fix="leave out `omega` and `kappa`")
 
 
 class Measuring(Section):
@@ -322,11 +319,10 @@ class Measuring(Section):
     vertical_arcsec: Seconds | None = key("The same of a vertical one; default: as horizontal", None, unit="arcsec")
     rounds: Annotated[Whole, Range(1, 10_000, "rounds")] = key("Rounds measured", 1)
 
-    @rule
-    def _one_precision(self) -> None:
+    def rules(self) -> Refusals:
         if self.theodolite is not None and self.sigma_arcsec is not None:
             message = "the theodolite and its standard deviation are both given"
-            raise wrong(message, code="two-keys", at="sigma_arcsec", fix="leave out one of them")
+            yield wrong(message, code="two-keys", at="sigma_arcsec", fix="leave out one of them")
 
     @property
     def measured(self) -> Theodolite:
@@ -340,11 +336,10 @@ class TheodoliteFile(OverPhoto, Measuring):
 
     sigma_um: Micrometres | None = key("Image accuracy wanted: how many rounds it needs", None, unit="um")
 
-    @rule
-    def _has_a_precision(self) -> None:
+    def rules(self) -> Refusals:
         if self.theodolite is None and self.sigma_arcsec is None:
             message = "nothing says how well directions are measured"
-            raise wrong(message, code="no-theodolite", expected="`sigma_arcsec` or `theodolite`")
+            yield wrong(message, code="no-theodolite", expected="`sigma_arcsec` or `theodolite`")
 
 
 class OrientationFile(WithCamera, Measuring):
@@ -436,11 +431,14 @@ def _points(
     given: Pointed, reading: Reading, layout: Sequence[Column], limits: Range, unit: str
 ) -> tuple[Points, Table | None]:
     """Read points from one of the two sources, in the unit of the limits."""
-    table = None
-    for path, findings in reading.named(("table",)):
+
+    def read(path: str, findings: Findings) -> Table | None:
         table = read_points(path, layout, findings)
         if table is not None:
             refuse_outside(table, unit, findings, given.angles)
+        return table
+
+    table = reading.table(("table",), read)
     for row, pair in enumerate(given.at):
         for column, value in enumerate(pair):
             if not limits.holds(value):
@@ -453,7 +451,7 @@ def _points(
 
 
 def read_sightings(
-    file: str, unit: str, angles: str, sigma: float, theodolite: Theodolite, findings: Findings
+    file: str, findings: Findings, unit: str, angles: str, sigma: float, theodolite: Theodolite
 ) -> Sightings | None:
     """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]``.
 
@@ -488,7 +486,7 @@ def read_sightings(
 
 
 def read_one_station(
-    file: str, given: OneStationFile, camera: Phototheodolite, findings: Findings
+    file: str, findings: Findings, given: OneStationFile, camera: Phototheodolite
 ) -> OneStation | None:
     """Read ``point,x,z,dx,dz,distance[,distance_later][,sigma][,sigma_d][,sigma_distance]``; None with faults."""
     read = read_points(file, ONE_STATION, findings)
@@ -549,19 +547,18 @@ class Station(Section):
         "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
     )
 
-    @rule
-    def _is_complete(self) -> None:
+    def rules(self) -> Refusals:
         turned = [name for name in ("alpha", "omega", "kappa") if getattr(self, name) is not None]
         if self.directions is not None and turned:
             message = f"`directions` gives the orientation of the photo, and `{turned[0]}` another one"
-            raise wrong(message, code="two-keys", at=turned[0], fix="remove one of the two")
+            yield wrong(message, code="two-keys", at=turned[0], fix="remove one of the two")
         if (self.position is None) != (self.alpha is None and self.directions is None):
             given = "alpha" if self.directions is None else "directions"
             missing, other = ("position", given) if self.position is None else ("alpha", "position")
             message = f"`{other}` is given and `{missing}` is not"
-            raise wrong(message, code="missing-key", expected="both, or neither in the normal case")
+            yield wrong(message, code="missing-key", expected="both, or neither in the normal case")
         if self.position is None and turned:
-            raise wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
+            yield wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
 
     @property
     def free(self) -> bool:
@@ -597,18 +594,17 @@ class Measurements(Section):
         "Standard deviation of a pseudo-parallax in rows without one; default: `sigma`", None, unit="unit"
     )
 
-    @rule
-    def _one_table(self) -> None:
+    def rules(self) -> Refusals:
         if (self.coordinates is None) == (self.pseudo_parallaxes is None):
             what = "two tables are named" if self.coordinates is not None else "no table is named"
-            raise wrong(what, code="missing-key", expected="either `coordinates` or `pseudo_parallaxes`")
+            yield wrong(what, code="missing-key", expected="either `coordinates` or `pseudo_parallaxes`")
         if self.coordinates is not None and self.sigma_d is not None:
             message = "coordinates have no pseudo-parallaxes that could have a standard deviation"
-            raise wrong(message, at="sigma_d", fix="remove it; use `sigma`")
+            yield wrong(message, at="sigma_d", fix="remove it; use `sigma`")
         for name, value in (("sigma", self.sigma), ("sigma_d", self.sigma_d)):
             if value is not None and not IMAGE_SIGMA.holds(value * MILLIMETRES[self.unit]):
                 message = f"{value:g} {self.unit} is out of range"
-                raise wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
+                yield wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
 
     @property
     def scale(self) -> Floats:
@@ -655,24 +651,23 @@ class TerrestrialFile(CamerasFile):
             return station, station
         return self.stations.left, self.stations.right
 
-    @rule
-    def _one_geometry(self) -> None:
+    def rules(self) -> Refusals:
         if self.stations is None and len(self.cameras) > 1:
-            raise wrong("nothing says which camera stands where", code="missing-key", expected="`stations`")
+            yield wrong("nothing says which camera stands where", code="missing-key", expected="`stations`")
         left, right = self.both
         if left.free != right.free:
             message = f"the {'right' if left.free else 'left'} station has no position"
-            raise wrong(message, code="missing-key", at="stations", expected="both or none")
+            yield wrong(message, code="missing-key", at="stations", expected="both or none")
         if left.free and self.base is not None:
-            raise wrong("the base follows from the positions of the stations", at="base", fix="remove it")
+            yield wrong("the base follows from the positions of the stations", at="base", fix="remove it")
         if not left.free and self.base is None:
             expected = "`base` for the normal case, or position and alpha of both stations"
-            raise wrong("nothing says how far apart the stations are", code="missing-key", expected=expected)
+            yield wrong("nothing says how far apart the stations are", code="missing-key", expected=expected)
         if left.free and self.axes is None:
             expected = "axes: [east, north, up], or [north, east, up] where x points north"
-            raise wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
+            yield wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
         if not left.free and self.axes is not None:
-            raise wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
+            yield wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
 
 
 class ReportFrame(NamedTuple):
@@ -750,9 +745,8 @@ def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, readin
     station, unit = given.both[SIDES.index(side)], given.measurements.unit
     sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * MILLIMETRES[unit]
     theodolite = Theodolite(station.sigma_arcsec, station.sigma_arcsec, 1)
-    sightings = None
-    for path, findings in reading.named(("stations", side, "directions")):
-        sightings = read_sightings(path, unit, given.angle_unit, sigma, theodolite, findings)
+    wanted = partial(read_sightings, unit=unit, angles=given.angle_unit, sigma=sigma, theodolite=theodolite)
+    sightings = reading.table(("stations", side, "directions"), wanted)
     reading.findings.stop()
     if sightings is not None:
         settings = OrientationSettings(eccentricity=station.eccentricity)
@@ -782,17 +776,17 @@ def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[P
     if measured is None:
         return None
     centre = np.array([each.principal_point for each in cameras] if len(cameras) == len(SIDES) else np.zeros((2, 2)))
-    times, series = None if given is None else _times(given, reading), None
+    times = None if given is None else _times(given, reading)
     kind = "coordinates" if measured.coordinates is not None else "pseudo_parallaxes"
-    for file, findings in reading.named(("measurements", kind)):
-        series = _read_series(file, given, measured, centre, findings)
+    read = partial(_read_series, given=given, measured=measured, centre=centre)
+    series = reading.table(("measurements", kind), read)
     if series is None or times is None or len(times) != len(series.epochs):
         return series
     return replace(series, times=np.array(times))
 
 
 def _read_series(
-    file: str, given: TerrestrialFile | None, measured: Measurements, centre: Floats, findings: Findings
+    file: str, findings: Findings, given: TerrestrialFile | None, measured: Measurements, centre: Floats
 ) -> Series | None:
     coordinates = measured.coordinates is not None
     read = (terrestrial.read_coordinates if coordinates else terrestrial.read_pseudo_parallaxes)(file, findings)

@@ -1,4 +1,4 @@
-"""The schema: defaults that stand in one place only, a description and a unit for every key."""
+"""The schema: every key described, with its unit and the default of the mathematics; pages say what is read."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.faults import Findings
+from photostrip.formats.measured import Manner, read_control, read_measurements
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import KINDS, keys_page, schema_of
 from photostrip.project.keys import Output, Processing, ProjectFile, Tolerances
 from photostrip.project.reading import Node, Place, checked, homes, parse
 from photostrip.project.sections import Section
 from tests.loops import nonempty
+from tests.pages import blocks
+from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from photostrip.errors import Fault
+
 
 PLACE = Place("a.yaml", 1, 1)
 UNITS = {"principal_distance": "mm", "sigma0_um": "um", "check_rms_z": "m", "parallax_limit": "mm", "earth_radius": "m"}
@@ -155,6 +159,39 @@ def test_the_page_of_keys_has_every_one_with_default_and_unit() -> None:
     assert "| `grubbs_alpha` | 0.05 | Probability of rejecting a good point of a pair without gross errors |" in rows
     assert "| `variance_components` | false |" in keys_page("project")
     assert "| `principal_distance` | required | Principal distance [mm] |" in rows
+
+
+PAGES = ROOT / "docs" / "files"
+
+
+def block(page: str, kind: str, number: int = 0) -> str:
+    """Give the content of a block of a page."""
+    found = [each for each in blocks(PAGES / page) if each.kind == kind]
+    return "\n".join(found[number].lines) + "\n"
+
+
+def test_the_whole_example_of_a_project_is_right() -> None:
+    findings = Findings()
+    root = parse(block("project.md", "yaml"), "project.yaml", findings)
+    assert root is not None
+    root.entries.pop("extends")
+    assert checked(ProjectFile, root, findings) is not None
+    assert findings.faults == ()
+
+
+@pytest.mark.parametrize(("page", "rows"), [("observations.md", 4), ("fiducials.md", 4), ("control.md", 4)])
+def test_the_example_of_a_table_is_right(tmp_path: Path, page: str, rows: int) -> None:
+    path, findings = tmp_path / "table.csv", Findings()
+    path.write_text(block(page, "text"), encoding="utf-8")
+    if page == "control.md":
+        control = read_control(str(path), 2, findings)
+        assert control is not None
+        assert len(control.table) == rows
+    else:
+        read = read_measurements([str(path)], findings, Manner(marks=page == "fiducials.md"))
+        assert read is not None
+        assert len(read.table) == rows
+    assert (findings.faults, findings.notes) == ((), [])
 
 
 def test_the_command_writes_the_page_of_any_kind_of_file(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What archives hold: lists of pairs, points measured again, other names of columns, tenths of micrometres."""
+"""Measured tables as people have them: forms of writing, pairs, points measured again, names of columns, units."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import yaml
 
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
-from photostrip.formats.simulation import project_files
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import load_project
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec
 from tests.loops import nonempty
-from tests.project.samples import FILES, Sample
+from tests.project.samples import CONTROL, FIDUCIALS, FILES, MARKED_FILES, OBSERVATIONS, Sample, sample
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from photostrip.points import PhotoPoints
     from photostrip.project.loading import Project
+
 
 PAIRS = """\
 pair,point,x,y,p,q
@@ -40,11 +42,8 @@ AGAIN = FILES["observations.csv"] + "1001,P1,10.504,-20.254\n1001,P1,10.508,-20.
 
 
 @pytest.fixture
-def sample(tmp_path: Path) -> Sample:
-    made = Sample(tmp_path)
-    for name, text in FILES.items():
-        made.write(name, text)
-    return made
+def plain(tmp_path: Path) -> Sample:
+    return sample(tmp_path)
 
 
 def measured(project: Project) -> dict[tuple[str, str], tuple[float, ...]]:
@@ -55,47 +54,47 @@ def measured(project: Project) -> dict[tuple[str, str], tuple[float, ...]]:
     }
 
 
-def told(sample: Sample) -> list[str]:
-    return [str(fault).replace(f"{sample.folder}/", "") for fault in sample.faults()]
+def told(plain: Sample) -> list[str]:
+    return [str(fault).replace(f"{plain.folder}/", "") for fault in plain.faults()]
 
 
 # ---------------------------------------------------------------------------------------------------- pairs
 
 
 @pytest.mark.parametrize("text", [PAIRS, BOTH, PAIRS.replace("-100", "/100"), PAIRS.replace("pair,", "Model,")])
-def test_a_list_of_pairs_is_the_table_of_its_photos(sample: Sample, text: str) -> None:
-    usual = measured(sample.load())
-    sample.write("observations.csv", text)
-    assert measured(sample.load()) == usual
+def test_a_list_of_pairs_is_the_table_of_its_photos(plain: Sample, text: str) -> None:
+    usual = measured(plain.load())
+    plain.write("observations.csv", text)
+    assert measured(plain.load()) == usual
 
 
-def test_the_photos_of_a_pair_may_have_dashes(sample: Sample) -> None:
-    usual = measured(sample.load())
+def test_the_photos_of_a_pair_may_have_dashes(plain: Sample) -> None:
+    usual = measured(plain.load())
     for name in ("project.yaml", "observations.csv"):
-        sample.change(name, "1001", "10-01") if name == "project.yaml" else sample.write(name, PAIRS)
-    sample.write("observations.csv", PAIRS.replace("1001-1002", "10-01-1002"))
-    found = measured(sample.load())
+        plain.change(name, "1001", "10-01") if name == "project.yaml" else plain.write(name, PAIRS)
+    plain.write("observations.csv", PAIRS.replace("1001-1002", "10-01-1002"))
+    found = measured(plain.load())
     assert {(photo.replace("10-01", "1001"), point) for photo, point in found} == set(usual)
 
 
-def test_a_pair_that_is_none_is_refused(sample: Sample) -> None:
-    sample.write("observations.csv", PAIRS.replace("2001-2002,P2", "2001_2003,P2"))
-    (line,) = told(sample)
+def test_a_pair_that_is_none_is_refused(plain: Sample) -> None:
+    plain.write("observations.csv", PAIRS.replace("2001-2002,P2", "2001_2003,P2"))
+    (line,) = told(plain)
     assert line == (
         "observations.csv:4:1: pair: pair 2001_2003 does not name two photos of the strips; expected a pair such as "
         "1001-1002; write it as LEFT-RIGHT with ids of the strips' photos, or use two columns left and right"
     )
 
 
-def test_a_pair_that_may_be_two_is_refused(sample: Sample) -> None:
-    sample.change("project.yaml", "[1001, 1002]", "[1, 1-1, 1-1-1]")
-    sample.write("observations.csv", PAIRS.replace("1001-1002", "1-1-1-1"))
-    assert "pair 1-1-1-1 may be photos 1 and 1-1-1 or 1-1 and 1-1 or 1-1-1 and 1" in told(sample)[0]
+def test_a_pair_that_may_be_two_is_refused(plain: Sample) -> None:
+    plain.change("project.yaml", "[1001, 1002]", "[1, 1-1, 1-1-1]")
+    plain.write("observations.csv", PAIRS.replace("1001-1002", "1-1-1-1"))
+    assert "pair 1-1-1-1 may be photos 1 and 1-1-1 or 1-1 and 1-1 or 1-1-1 and 1" in told(plain)[0]
 
 
-def test_a_list_of_pairs_without_a_parallax_is_told_what_it_lacks(sample: Sample) -> None:
-    sample.write("observations.csv", PAIRS.replace("p,q", "p"))
-    assert told(sample)[0].startswith(
+def test_a_list_of_pairs_without_a_parallax_is_told_what_it_lacks(plain: Sample) -> None:
+    plain.write("observations.csv", PAIRS.replace("p,q", "p"))
+    assert told(plain)[0].startswith(
         "observations.csv:1: q: there is no column `q`; expected a header `pair,point,x,y,p,q`"
     )
 
@@ -133,10 +132,10 @@ def test_a_strip_from_a_stereocomparator_is_that_of_its_photos(tmp_path: Path) -
 # ------------------------------------------------------------------------------------------ measured again
 
 
-def test_points_measured_again_are_averaged_and_their_spread_told(sample: Sample) -> None:
-    sample.write("observations.csv", AGAIN)
-    sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
-    project = sample.load()
+def test_points_measured_again_are_averaged_and_their_spread_told(plain: Sample) -> None:
+    plain.write("observations.csv", AGAIN)
+    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
+    project = plain.load()
     x, y, sx, sy = measured(project)["1001", "P1"]
     assert [x, y] == pytest.approx([10.504, -20.252])
     assert [sx, sy] == pytest.approx([0.005 / np.sqrt(3)] * 2)
@@ -147,20 +146,20 @@ def test_points_measured_again_are_averaged_and_their_spread_told(sample: Sample
     assert "worst is point P1 on photo 1001, 0.004 off its mean" in note.message
 
 
-def test_the_mean_is_weighted(sample: Sample) -> None:
+def test_the_mean_is_weighted(plain: Sample) -> None:
     text = "photo,point,x,y,sx,sy\n" + "".join(f"{row},,\n" for row in FILES["observations.csv"].splitlines()[1:])
-    sample.write("observations.csv", text + "1001,P1,10.51,-20.25,0.01,0.01\n")
-    sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
-    x, _, sx, _ = measured(sample.load())["1001", "P1"]
+    plain.write("observations.csv", text + "1001,P1,10.51,-20.25,0.01,0.01\n")
+    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
+    x, _, sx, _ = measured(plain.load())["1001", "P1"]
     weights = np.array([1 / 0.005**2, 1 / 0.01**2])
     assert x == pytest.approx(weights @ [10.5, 10.51] / weights.sum())
     assert sx == pytest.approx(weights.sum() ** -0.5)
 
 
-def test_measurements_that_are_not_of_one_point_are_refused(sample: Sample) -> None:
-    sample.write("observations.csv", FILES["observations.csv"] + "1001,P1,10.5,-20.05\n")
-    sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
-    (line,) = told(sample)
+def test_measurements_that_are_not_of_one_point_are_refused(plain: Sample) -> None:
+    plain.write("observations.csv", FILES["observations.csv"] + "1001,P1,10.5,-20.05\n")
+    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
+    (line,) = told(plain)
     assert line == (
         "observations.csv:10:6: point: point P1 is measured 2 times on photo 1001 (lines 2, 10), up to 0.2 in y apart: "
         "20 standard deviations from the mean; remove the wrong one, or give the other point an id of its own"
@@ -170,16 +169,16 @@ def test_measurements_that_are_not_of_one_point_are_refused(sample: Sample) -> N
 # ----------------------------------------------------------------------------------------- names and units
 
 
-def test_columns_may_have_other_names(sample: Sample) -> None:
-    usual = measured(sample.load())
+def test_columns_may_have_other_names(plain: Sample) -> None:
+    usual = measured(plain.load())
     text = FILES["observations.csv"].replace("photo,point,x,y", "Bild,Punkt,xs,ys")
-    sample.write("observations.csv", text)
-    sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {photo: Bild, point: PUNKT, x: xs, y: ys}\n")
-    assert measured(sample.load()) == usual
+    plain.write("observations.csv", text)
+    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {photo: Bild, point: PUNKT, x: xs, y: ys}\n")
+    assert measured(plain.load()) == usual
 
 
-def test_a_declared_column_goes_before_its_usual_name(sample: Sample) -> None:
-    usual = measured(sample.load())
+def test_a_declared_column_goes_before_its_usual_name(plain: Sample) -> None:
+    usual = measured(plain.load())
     rows = FILES["observations.csv"].splitlines()
     text = "\n".join(
         [
@@ -187,9 +186,9 @@ def test_a_declared_column_goes_before_its_usual_name(sample: Sample) -> None:
             *(f"{row.rsplit(',', 2)[0]},0,{row.rsplit(',', 1)[1]},{row.split(',')[2]}" for row in rows[1:]),
         ]
     )
-    sample.write("observations.csv", text + "\n")
-    sample.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {x: x refined}\n")
-    assert measured(sample.load()) == usual
+    plain.write("observations.csv", text + "\n")
+    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {x: x refined}\n")
+    assert measured(plain.load()) == usual
 
 
 @pytest.mark.parametrize(
@@ -201,17 +200,195 @@ def test_a_declared_column_goes_before_its_usual_name(sample: Sample) -> None:
         ("{photo: }", ("project.yaml:19", "photo")),
     ],
 )
-def test_declared_columns_that_are_wrong(sample: Sample, columns: str, words: tuple[str, ...]) -> None:
-    sample.change("project.yaml", "  unit: mm\n", f"  unit: mm\n  columns: {columns}\n")
-    assert any(all(word in line for word in nonempty(words)) for line in told(sample)), told(sample)
+def test_declared_columns_that_are_wrong(plain: Sample, columns: str, words: tuple[str, ...]) -> None:
+    plain.change("project.yaml", "  unit: mm\n", f"  unit: mm\n  columns: {columns}\n")
+    assert any(all(word in line for word in nonempty(words)) for line in told(plain)), told(plain)
 
 
-def test_tenths_of_micrometres(sample: Sample) -> None:
-    usual = measured(sample.load())
+def test_tenths_of_micrometres(plain: Sample) -> None:
+    usual = measured(plain.load())
     rows = [row.split(",") for row in FILES["observations.csv"].splitlines()[1:]]
     text = "photo,point,x,y\n" + "".join(f"{a},{b},{float(x) * 1e4:.0f},{float(y) * 1e4:.0f}\n" for a, b, x, y in rows)
-    sample.write("observations.csv", text)
-    sample.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n")
-    sample.change("project.yaml", "sigma: 0.005", "sigma: 50")
-    found = measured(sample.load())
+    plain.write("observations.csv", text)
+    plain.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n")
+    plain.change("project.yaml", "sigma: 0.005", "sigma: 50")
+    found = measured(plain.load())
     assert {key: pytest.approx(value) for key, value in usual.items()} == found
+
+
+HEADER, *ROWS = [line.split(",") for line in OBSERVATIONS.splitlines()]
+NUMBERED = "columns={photo: 1, point: 2, x: 3, y: 4}"
+
+
+def written(separator: str, *rows: list[str], decimal: str = ".") -> str:
+    return "".join(separator.join(cell.replace(".", decimal) for cell in row) + "\n" for row in rows)
+
+
+def in_columns(*rows: list[str]) -> str:
+    return "".join("  " + "".join(f"{cell:>12}" for cell in row) + "  \n" for row in rows)
+
+
+# a table of image coordinates, and what is said of it
+WAYS = {
+    "semicolons": (written(";", HEADER, *ROWS), ["separator=semicolon"]),
+    "decimal commas": (written(";", HEADER, *ROWS, decimal=","), ["separator=semicolon", "decimal=comma"]),
+    "tabs": (written("\t", HEADER, *ROWS), ["separator=tab"]),
+    "tabs and decimal commas": (written("\t", HEADER, *ROWS, decimal=","), ["separator=tab", "decimal=comma"]),
+    "columns of blanks": (in_columns(HEADER, *ROWS), ["separator=blank"]),
+    "blanks and tabs": (written(" \t ", HEADER, *ROWS), ["separator=blank"]),
+    "blanks and decimal commas": (in_columns(HEADER, *ROWS).replace(".", ","), ["separator=blank", "decimal=comma"]),
+    "lines above": ("comparator 7, read by N. N.\n\n" + OBSERVATIONS, ["skip=2"]),
+    "by number": (written(",", *ROWS), [NUMBERED]),
+    "by number, in columns of blanks": ("\n" + in_columns(*ROWS), ["separator=blank", NUMBERED]),
+    "by number, others beside": (
+        written(";", *([y, x, "7", point, photo, ""] for photo, point, x, y in ROWS), decimal=","),
+        ["separator=semicolon", "decimal=comma", "columns={photo: 5, point: 4, x: 2, y: 1}"],
+    ),
+    "by number, below a header": (OBSERVATIONS, ["skip=1", NUMBERED]),
+    "in quotation marks": (written(";", HEADER, *ROWS).replace("P1", '"P1"'), ["separator=semicolon"]),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_same_image_points_come_of_it(tmp_path: Path, way: str) -> None:
+    text, said = WAYS[way]
+    expected = sample(tmp_path / "plain").load().inputs.observations
+    project = sample(tmp_path / "way")
+    project.write("observations.csv", text)
+    found = project.load([f"observations.{each}" for each in said]).inputs.observations
+    assert (found.photo_ids, found.point_ids) == (expected.photo_ids, expected.point_ids)
+    np.testing.assert_array_equal(found.xy, expected.xy)
+
+
+def test_every_table_of_given_coordinates_can_be_written_so(tmp_path: Path) -> None:
+    expected = sample(tmp_path / "plain").load().inputs.control
+    project = sample(tmp_path / "way")
+    project.write("control.csv", CONTROL.partition("\n")[2].replace(",", ";").replace(".", ","))
+    columns = "{point: 1, x: 2, y: 3, z: 4, use: 5, role: 6}"
+    said = ["separator=semicolon", "decimal=comma", f"columns={columns}"]
+    found = project.load([f"control[0].{each}" for each in said]).inputs.control
+    assert found.ids == expected.ids
+    np.testing.assert_array_equal(found.enu, expected.enu)
+    np.testing.assert_array_equal(found.check, expected.check)
+
+
+GIVEN = """\
+processing: {adjustment: bundle}
+camera_positions:
+  {file: gnss.txt, crs: "EPSG:32633", axes: [east, north, up], sigma: [1, 1, 1], separator: blank,
+   columns: {photo: 1, x: 2, y: 3, z: 4}}
+orientations:
+  {file: imu.txt, crs: "EPSG:32633", axes: [east, north, up], sigma: [1, 1, 1], sigma_angles: [1, 1, 1],
+   separator: tab, decimal: comma, columns: {photo: Bild, alpha: Querneigung}}
+"""
+
+
+def test_tables_of_cameras_can_be_written_so(tmp_path: Path) -> None:
+    project = sample(tmp_path)
+    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").partition("processing:")[0]
+    project.write("project.yaml", text + GIVEN)
+    project.write("gnss.txt", "1001  500012.4  4649871.4  2012.3\n")
+    project.write(
+        "imu.txt", "Bild\tx\ty\tz\tQuerneigung\tomega\tkappa\n1001\t500012,4\t4649871,4\t2012,3\t9\t0,5\t90\n"
+    )
+    inputs = project.load().inputs
+    assert inputs.positions is not None
+    assert inputs.orientations is not None
+    np.testing.assert_array_equal(inputs.positions.enu, [[500012.4, 4649871.4, 2012.3]])
+    np.testing.assert_array_equal(inputs.orientations.enu, [[500012.4, 4649871.4, 2012.3]])
+
+
+def test_several_files_are_one_table(tmp_path: Path) -> None:
+    expected = sample(tmp_path / "one").load().inputs.observations
+    project = sample(tmp_path / "several")
+    turned = [[y, x, point, photo] for photo, point, x, y in ROWS[4:]]
+    project.write("a.csv", written(",", HEADER, *ROWS[:4]))
+    project.write("b.csv", written(",", ["y", "x", "point", "photo"], *turned))
+    read = project.load(["observations.file=[a.csv, b.csv]"])
+    found = read.inputs.observations
+    assert (found.photo_ids, found.point_ids) == (expected.photo_ids, expected.point_ids)
+    np.testing.assert_array_equal(found.xy, expected.xy)
+    assert yaml.safe_load(read.resolved)["observations"]["file"] == ["a.csv", "b.csv"]
+    assert [path.name for path in read.files] == ["project.yaml", "a.csv", "b.csv", "control.csv"]
+
+
+def test_several_files_of_pairs_and_of_marks(tmp_path: Path) -> None:
+    plain, project = sample(tmp_path / "one", MARKED_FILES), sample(tmp_path / "several", MARKED_FILES)
+    head, *rows = FIDUCIALS.splitlines(keepends=True)
+    project.write("a.csv", head + "".join(rows[:3]))
+    project.write("b.csv", head + "".join(rows[3:]))
+    pairs = "left,right,point,xl,yl,xr,yr\n"
+    project.write("c.csv", pairs + "1001,1002,P1,10.5,-20.25,-80.5,-20.5\n1001,1002,P2,11.5,20.25,-79.5,20.0\n")
+    project.write("d.csv", pairs + "2001,2002,P2,10,20,-80,20\n2001,2002,G1,30,40,-60,40\n")
+    one = plain.load().inputs
+    found = project.load(["fiducial_measurements.file=[a.csv, b.csv]", "observations.file=[c.csv, d.csv]"]).inputs
+    assert found.fiducials is not None
+    assert one.fiducials is not None
+    np.testing.assert_array_equal(found.fiducials.xy, one.fiducials.xy)
+    np.testing.assert_array_equal(
+        sorted(map(tuple, found.observations.xy.tolist())), sorted(map(tuple, one.observations.xy.tolist()))
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "said", "place", "words"),
+    [
+        ("1001,P9,x,1\n", [], "b.csv:2:9: x:", "`x` is not a number"),
+        ("1001,P1,1,1\n", [], "b.csv:2:6: point:", "already measured on photo 1001, in line 2 of "),
+        ("1001,P1,50,1\n", ["observations.repeated=average"], "b.csv:2:6:", "(line 2 of "),
+    ],
+)
+def test_faults_of_several_files_have_their_own_place(
+    tmp_path: Path, rows: str, said: list[str], place: str, words: str
+) -> None:
+    project = sample(tmp_path)
+    project.write("b.csv", "photo,point,x,y\n" + rows)
+    (line,) = project.lines(["observations.file=[observations.csv, b.csv]", *said])
+    assert line.startswith(place)
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "place", "words", "fix"),
+    [
+        (WAYS["semicolons"][0], [], "observations.csv:1:", "separated by semicolons", "`separator: semicolon`"),
+        (WAYS["tabs"][0], [], "observations.csv:1:", "separated by tabs", "`separator: tab`"),
+        (in_columns(HEADER, *ROWS), [], "observations.csv:1:", "separated by blanks", "`separator: blank`"),
+        (OBSERVATIONS, ["separator=tab"], "observations.csv:1:", "separated by commas", "`separator: comma`"),
+        (WAYS["decimal commas"][0], ["separator=semicolon"], "observations.csv:2:9: x:", "decimal comma", "`decimal: "),
+        (WAYS["semicolons"][0], WAYS["decimal commas"][1], "observations.csv:2:9: x:", "has a point", "comma"),
+        (OBSERVATIONS, ["decimal=comma"], "", "commas cannot stand between the fields", "`separator`"),
+        (OBSERVATIONS, [NUMBERED], "observations.csv:1:13: x:", "`x` is not a number", "`skip: 1`"),
+        (OBSERVATIONS, [NUMBERED.replace("4", "5")], "observations.csv:1:", "no field 5 for `y`", "4 fields"),
+        (OBSERVATIONS, [NUMBERED.replace("4", "3")], "observations.csv:1:", "no field 3 for `y`", ""),
+        (OBSERVATIONS, ["columns={photo: 1, point: 2, x: 3}"], "observations.csv:1:", "no number for `y`", "add `y`"),
+        (OBSERVATIONS, ["columns={photo: 1, point: punkt}"], "", "`punkt` is no number of a field", "by number"),
+        (OBSERVATIONS, ["skip=-1"], "", "-1 is no number of lines", ""),
+        (OBSERVATIONS, ["skip=99"], "observations.csv:1:", "has no header", ""),
+        (OBSERVATIONS, ["file=[]"], "", "no file is named", ""),
+        (OBSERVATIONS, ["file=[observations.csv, observations.csv]"], "", "named twice", "remove one"),
+        (
+            in_columns(HEADER, ["1001", "P 1", "1", "2"]),
+            ["separator=blank"],
+            "observations.csv:2:",
+            "5 fields",
+            "blank",
+        ),
+    ],
+)
+def test_what_is_wrong_is_explained(
+    tmp_path: Path, text: str, said: list[str], place: str, words: str, fix: str
+) -> None:
+    project = sample(tmp_path)
+    project.write("observations.csv", text)
+    first, *_ = project.lines([f"observations.{each}" for each in said])
+    assert first.startswith(place)
+    assert words in first
+    assert fix in first.partition(words)[2]
+
+
+def test_points_of_pairs_below_points_of_photos_are_refused(tmp_path: Path) -> None:
+    project = sample(tmp_path)
+    project.write("b.csv", "left,right,point,xl,yl,xr,yr\n1001,1002,P7,1,2,3,4\n")
+    (line,) = project.lines(["observations.file=[observations.csv, b.csv]"])
+    assert line.startswith("b.csv:1: holds points of pairs, but ")

@@ -1,18 +1,23 @@
-"""Control lists of two zones of plane coordinates in one project."""
+"""Ground frames of a project: zones joined by common points, datums tied once."""
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+from shutil import copytree
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
+from photostrip.pipeline.run import triangulate
+from photostrip.project.loading import adjust_project, load_project
 from tests.geodesy.test_zones import in_both
 from tests.project.samples import FILES, PROJECT, Sample, sample
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from photostrip.pipeline.results import Result
 
-    import numpy as np
 
 LISTS = """\
 control:
@@ -82,3 +87,43 @@ def test_the_first_list_is_no_other_zone(tmp_path: Path) -> None:
     axes = "    axes: [east, north, up]\n"
     given.write("project.yaml", text.replace(axes, f"{axes}    other_zone: true\n", 1))
     assert any("brought into the zone of the first one" in line for line in given.lines())
+
+
+SAMPLE = Path("sample_data/simulated-20")
+ED50 = ("control[0].crs=EPSG:23030", "output.crs=EPSG:32630")
+
+
+@cache
+def plain() -> Result:
+    """Adjust the sample as it is."""
+    return adjust_project(load_project(SAMPLE / "project.yaml"))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
+@pytest.mark.parametrize(
+    "overrides", [ED50, ("output.crs=EPSG:32634",), ("control[0].crs=local", "processing.earth_curvature=model")]
+)
+def test_what_is_overridden_counts(overrides: tuple[str, ...]) -> None:
+    project = load_project(SAMPLE / "project.yaml", overrides)
+    found, anew = adjust_project(project), triangulate(project.inputs, project.settings)
+    assert [frame.describe() for frame in found.frames] == [frame.describe() for frame in anew.frames]
+    assert np.array_equal(found.points.ground, anew.points.ground)
+    assert found.output.describe() != plain().output.describe()
+    assert np.abs(found.points.ground - plain().points.ground).max() > 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
+def test_each_project_has_its_own_datum_shift(tmp_path: Path) -> None:
+    """PROJ goes from ED50 to WGS 84 by one operation in Germany and by another in Spain."""
+    south = tmp_path / "south"
+    copytree(SAMPLE, south)
+    control = (south / "control.csv").read_text()
+    assert control.count(",55") > 10
+    (south / "control.csv").write_text(control.replace(",55", ",45"))  # north, by 1000 km
+    both = [adjust_project(load_project(each / "project.yaml", ED50)) for each in (SAMPLE, south)]
+    alone = [triangulate(each.inputs, each.settings) for each in both]
+    shifts = [each.frames[0].datum_shift for each in both]
+    assert shifts == [each.frames[0].datum_shift for each in alone]
+    assert shifts[0] != shifts[1]

@@ -1,0 +1,203 @@
+"""Cameras of a project: distances between fiducial marks, k0 of a certificate, cameras in pixels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import photostrip
+from photostrip.project.check import check_project
+from photostrip.strip.corrections import ideal_from_image
+from tests.project.samples import MARKED_FILES, Sample, sample
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+GIVEN = "    fiducials: {F1: [106, -106], F2: [-106, -106]}\n"
+PLACES = "    fiducial_places: {F1: bottom-right, F2: bottom-left, F3: top-left, F4: top-right}\n"
+SIDES = "[F1, F2, 211.98], [F2, F3, 212.01], [F3, F4, 211.99], [F4, F1, 212.02]"
+DIAGONALS = "[F1, F3, 299.82], [F2, F4, 299.80]"
+
+
+@pytest.fixture
+def marked(tmp_path: Path) -> Sample:
+    return sample(tmp_path, MARKED_FILES)
+
+
+def certified(marked: Sample, places: str, distances: str) -> list[str]:
+    marked.change("project.yaml", GIVEN, f"{places}    fiducial_distances: [{distances}]\n")
+    return [str(fault).replace(f"{marked.folder}/", "") for fault in marked.faults()]
+
+
+def test_the_camera_gets_coordinates_and_their_quality_is_told(marked: Sample) -> None:
+    assert certified(marked, PLACES, f"{SIDES}, {DIAGONALS}") == []
+    project = marked.load()
+    marks = project.inputs.strips[0].camera.fiducials
+    assert marks["F1"] == pytest.approx((106.0, -106.0), abs=0.05)
+    assert marks["F3"] == pytest.approx((-106.0, 106.0), abs=0.05)
+    (note,) = [note for note in project.hints if note.code == "certificate"]
+    assert note.message.startswith("camera RC30: 4 fiducial marks from 6 distances, standard deviation of one ")
+    assert (note.severity, note.line) == ("note", 9)
+
+
+def test_nominal_coordinates_may_stand_beside_distances(marked: Sample) -> None:
+    nominal = "    fiducials: {F1: [106, -106], F2: [-106, -106], F3: [-106, 106], F4: [106, 106]}\n"
+    assert certified(marked, nominal, f"{SIDES}, {DIAGONALS}") == []
+    assert marked.load().inputs.strips[0].camera.fiducials["F4"] == pytest.approx((106.0, 106.0), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("places", "distances", "words"),
+    [
+        (PLACES, SIDES, "cameras.RC30.fiducial_distances: 4 independent distances do not fix a figure of 4 marks"),
+        (PLACES, f"{SIDES}, [F1, F9, 1.0]", "cameras.RC30.fiducial_distances[4]: the camera has no mark F9"),
+        (PLACES.replace("top-left", "middle"), SIDES, "fiducial_places.F3: `middle` is not known"),
+        (PLACES, SIDES.replace("211.98", "-2"), "fiducial_distances[0][2]: -2 is out of range"),
+        (PLACES, SIDES.replace("211.98", "nan"), "fiducial_distances[0][2]"),
+        (PLACES, "[F1, F2]", "fiducial_distances[0]"),
+        ("", SIDES, "distances alone do not say which mark is where"),
+        (GIVEN + PLACES, SIDES, "places of fiducial marks are for distances between them without coordinates"),
+    ],
+)
+def test_certificates_that_are_wrong(marked: Sample, places: str, distances: str, words: str) -> None:
+    lines = certified(marked, places, distances)
+    assert any(words in line for line in lines), lines
+
+
+def test_a_distance_that_does_not_fit_is_a_warning(marked: Sample) -> None:
+    assert certified(marked, PLACES, f"{SIDES}, {DIAGONALS}".replace("299.80", "301.80")) == []
+    (note,) = [note for note in marked.load().hints if note.code == "certificate"]
+    assert note.severity == "warning"
+
+
+FOCAL, K0, RADIAL, DECENTRING = 153.217, -3.1e-3, (2.4e-7, -3.0e-12, 5.0e-17), (1.1e-6, -2.3e-6)
+XY = np.random.default_rng(3).uniform(-105.0, 105.0, (50, 2))
+
+
+def polynomial(xy: np.ndarray) -> np.ndarray:
+    """The shift as USGS writes it: X (K0 + K1 r^2 + ...) + P1 (r^2 + 2 X^2) + 2 P2 X Y."""
+    x, y = xy.T
+    r2 = x * x + y * y
+    radial = K0 + RADIAL[0] * r2 + RADIAL[1] * r2**2 + RADIAL[2] * r2**3
+    decentring = (
+        DECENTRING[0] * (r2 + 2 * x * x) + 2 * DECENTRING[1] * x * y,
+        DECENTRING[1] * (r2 + 2 * y * y) + 2 * DECENTRING[0] * x * y,
+    )
+    return np.column_stack([x * radial + decentring[0], y * radial + decentring[1]])
+
+
+@pytest.mark.parametrize("direction", ["image_to_ideal", "ideal_to_image"])
+def test_rays_have_the_directions_of_the_certificate(tmp_path: Path, direction: str) -> None:
+    project = sample(tmp_path)
+    lens = f"{{model: brown, k0: {K0}, k: {list(RADIAL)}, p: {list(DECENTRING)}, direction: {direction}}}"
+    project.change("project.yaml", "{model: brown, k: [1e-8, 0, 0], direction: image_to_ideal}", lens)
+    loaded = project.load()
+    camera = loaded.inputs.strips[0].camera
+    assert camera.distortion is not None
+    ideal, image = (XY + polynomial(XY), XY) if direction == "image_to_ideal" else (XY, XY + polynomial(XY))
+    found = ideal_from_image(image, camera.distortion) / camera.principal_distance
+    np.testing.assert_allclose(found, ideal / FOCAL, rtol=0.0, atol=1e-13)
+    (note,) = [each for each in loaded.hints if each.code == "linear-distortion"]
+    assert f"153.217 mm becomes {camera.principal_distance:.6g} mm" in note.message
+    assert (note.line, note.key) == (8, "cameras.RC30.distortion.k0")
+    assert f"k0: {K0}" in loaded.resolved
+
+
+@pytest.mark.parametrize(
+    ("lens", "words"),
+    [
+        ("{model: brown, k0: 1.5, direction: image_to_ideal}", "1.5 is out of range"),
+        (
+            "{model: radial-table, k0: 1e-4, radius: [0, 9], distortion: [0, 0], direction: image_to_ideal}",
+            "`k0` does not belong to model radial-table",
+        ),
+    ],
+)
+def test_what_is_no_k0_is_refused(tmp_path: Path, lens: str, words: str) -> None:
+    project = sample(tmp_path)
+    project.change("project.yaml", "{model: brown, k: [1e-8, 0, 0], direction: image_to_ideal}", lens)
+    (line,) = project.lines()
+    assert line.startswith("project.yaml:8:")
+    assert words in line
+
+
+SPEC = {
+    "flight": {"photos": 5, "flying_height": 100},
+    "camera": {
+        "preset": "digital",
+        "principal_distance": 8.8,
+        "principal_point": [0.024, -0.012],
+        "format": [13.2, 8.8],
+        "pixel_size": 0.0024,
+        "distortion": {"model": "brown", "k": [-2e-4, 0, 0], "p": [1e-5, -2e-5], "direction": "ideal_to_image"},
+    },
+    "image": {"unit": "px", "y_axis": "down", "sigma_um": 1.2},
+}
+K1, P1, P2 = -2e-4 * 8.8**2, 1e-5 * 8.8, 2e-5 * 8.8
+IN_PIXELS: dict[str, list[object]] = {  # principal point, distortion of the same camera
+    "opencv": [[2750 + 10 - 0.5, 1833 + 1 / 3 + 5 - 0.5], {"k1": K1, "p1": P2, "p2": P1}],
+    "metashape": [[10, 5], {"k1": K1, "p1": P1, "p2": P2}],
+}
+
+
+def in_pixels(folder: Path, given_as: str = "", **changes: object) -> Path:
+    """Write a simulated project; with a convention its camera is given in pixels."""
+    simulation = photostrip.simulate(SPEC)
+    simulation.write(folder)
+    path = folder / "project.yaml"
+    if given_as:
+        point, lens = IN_PIXELS[given_as]
+        keys = {"unit": "px", "convention": given_as, "image_size": [5500, 3666.6666666666665],
+                "focal_length": 8.8 / 0.0024, "principal_point": point, "distortion": lens}  # fmt: skip
+        lines = [f"    {name}: {value}".replace("'", "") for name, value in {**keys, **changes}.items()]
+        before, _, rest = path.read_text(encoding="utf-8").partition("    principal_distance:")
+        path.write_text("\n".join([before.rstrip(), *lines, rest[rest.index("strips:") :]]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("convention", IN_PIXELS)
+def test_the_result_is_that_of_the_same_camera_in_millimetres(tmp_path: Path, convention: str) -> None:
+    known = photostrip.run(in_pixels(tmp_path / "mm"))
+    found = photostrip.run(in_pixels(tmp_path / "px", convention))
+    for name in "xyz":
+        assert [each[name] for each in found.document["points"]] == pytest.approx(
+            [each[name] for each in known.document["points"]], abs=2e-4
+        )
+
+
+def test_the_size_of_a_pixel_changes_micrometres_only(tmp_path: Path) -> None:
+    known = photostrip.run(in_pixels(tmp_path / "small", "opencv"))
+    found = photostrip.run(in_pixels(tmp_path / "large", "opencv", pixel_size=0.0024))
+    ratio = found.document["summary"]["image_rms_um"] / known.document["summary"]["image_rms_um"]
+    assert ratio == pytest.approx(2.4, rel=0.1)  # rounded to 0.1 µm
+    one, other = ([each["z"] for each in result.document["points"]] for result in (known, found))
+    assert one == pytest.approx(other, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"convention": "opencvv"}, "cameras.digital.convention: `opencvv` is not known"),
+        ({"focal_length": "[1, 2, 3]"}, "cameras.digital.focal_length: a list is given here"),
+        ({"focal_length": 0}, "cameras.digital.focal_length: 0 is out of range"),
+        ({"distortion": "{k4: 0.1}"}, "cameras.digital.distortion: the coefficient k4 of opencv has no counterpart"),
+        ({"distortion": "{q1: 0.1}"}, "cameras.digital.distortion: the coefficient q1 of opencv has no counterpart"),
+        ({"format": "[1, 1]"}, "cameras.digital.format: the key `format` is not known"),
+    ],
+)
+def test_faults_have_their_place(tmp_path: Path, changes: dict[str, object], told: str) -> None:
+    faults = check_project(in_pixels(tmp_path, "opencv", **changes)).faults
+    assert len(faults) == 1
+    assert told in str(faults[0])
+    assert faults[0].line
+
+
+def test_a_camera_in_pixels_needs_measurements_in_pixels(tmp_path: Path) -> None:
+    path = in_pixels(tmp_path, "opencv")
+    text = path.read_text(encoding="utf-8").replace("unit: px\n  y_axis", "unit: mm\n  y_axis")
+    path.write_text(text, encoding="utf-8")
+    (fault,) = [each for each in check_project(path).faults if each.code == "unit-elsewhere"]
+    assert "is given in pixels, the image coordinates are not" in fault.message
