@@ -46,9 +46,8 @@ def planned(answer: Answer, kind: str, *arguments: object) -> Any:  # noqa: ANN4
         ),
         (
             "strip",
-            ["models=5", "layouts=[bands=2, corners]", "methods=[similarity, degree 2]", "required=[0.4, 0.5]"],
-            "models: 5\nlayouts: {2 bands: {bands: 2}, corners: {layout: corners}}\n"
-            "methods: [similarity, degree 2]\nrequired: {plan: 0.4, height: 0.5}\n",
+            ["models=5", "layouts=[bands=2, corners]", "methods=[similarity, degree 2]"],
+            "models: 5\nlayouts: {2 bands: bands=2, corners: {layout: corners}}\nmethods: [similarity, degree 2]\n",
         ),
         (
             "displacement",
