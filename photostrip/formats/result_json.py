@@ -10,7 +10,6 @@ from typing import Any
 from photostrip.formats.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.formats.tables import parsed_json
 from photostrip.notes import Document
-from photostrip.result.certificate import faults_of_edited
 from photostrip.result.derived import with_derived
 from photostrip.result.description import LEFT_OUT, SCHEMA
 from photostrip.result.reading import read
@@ -100,6 +99,8 @@ def checked(document: Any, file: str, lacking: Collection[str] = ()) -> Document
         whole = read(document, file, lacking=lacking)
     except RecursionError:
         refuse(file, "result-json", "is nested too deeply", expected=RESULT)
+    from photostrip.result.certificate import faults_of_edited  # with scipy
+
     with faults_of_edited("read", (whole, file)):
         return in_frame(with_derived(whole))
 
