@@ -74,16 +74,7 @@ class Place(NamedTuple):
     column: int = 0
 
     def fault(self, message: str, code: str, *, key: str = "", expected: str = "", fix: str = "") -> Fault:
-        return Fault(
-            message=message,
-            code=code,
-            file=self.file,
-            line=self.line,
-            column=self.column,
-            key=key,
-            expected=expected,
-            fix=fix,
-        )
+        return Fault(message, code, *self, key=key, expected=expected, fix=fix)
 
     def note(self, code: str, message: str, severity: str = "note", *, key: str = "") -> Note:
         return Note(code, message, severity, file=self.file, line=self.line, column=self.column, key=key)
@@ -330,29 +321,22 @@ class _Tree:
 def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
     """Say where YAML breaks off and what may be the matter."""
     problem = str(getattr(error, "problem", None) or error).splitlines()[0]
-    mark = getattr(error, "problem_mark", None)
-    if (
-        "undefined alias" in problem
-        and mark is not None
-        and (alias := _ALIAS.match(text.splitlines()[mark.line], mark.column))
-    ):
-        message, fix = (
-            f"the alias *{shown(alias[1])} stands for nothing",
-            f"name a value with &{shown(alias[1])} before",
-        )
-        fix += ", or put * between quotation marks"
-        return Fault(message, "alias", file, line=mark.line + 1, column=mark.column + 1, fix=fix)
-    begun = getattr(error, "context_mark", None)
-    lines = text.splitlines() or [""]
+    mark, begun = getattr(error, "problem_mark", None), getattr(error, "context_mark", None)
     if mark is None:
         return Fault(f"cannot be read as YAML: {problem}", "yaml", file)
+    lines = text.splitlines() or [""]
+    if "undefined alias" in problem and (alias := _ALIAS.match(lines[mark.line], mark.column)):
+        name = shown(alias[1])
+        fix = f"name a value with &{name} before, or put * between quotation marks"
+        place = Place(file, mark.line + 1, mark.column + 1)
+        return place.fault(f"the alias *{name} stands for nothing", "alias", fix=fix)
     never_closed = "',' or" in problem or "end of stream" in problem or mark.line >= len(lines)
     if begun is not None and never_closed:
         mark = begun  # where something was opened is a better place than where its end is missed
     line = min(mark.line, len(lines) - 1)
     column = mark.column if line == mark.line else 0
     what, fix = _syntax_explained(problem, lines[line], column)
-    return Fault(message=what, code="yaml", file=file, line=line + 1, column=column + 1, fix=fix)
+    return Place(file, line + 1, column + 1).fault(what, "yaml", fix=fix)
 
 
 def _syntax_explained(problem: str, line: str, column: int) -> tuple[str, str]:
@@ -483,15 +467,9 @@ class Reading:
             raise InputError(at_own_key(fault, self.root) for fault in named) from None
 
 
-def read_keys(kind: type[S], path: Path | None, assignments: Sequence[str]) -> tuple[S, Reading]:
+def read_keys(kind: type[S], path: Path | None, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
     """Read a file of which every key can be set, or make one of assignments alone, or raise every fault."""
     reading = Reading.of_keys(kind, path, assignments)
-    return reading.read(kind), reading
-
-
-def read_file(kind: type[S], file: str, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
-    """Read a file of a kind, or raise every fault of every file."""
-    reading = Reading.of(file, assignments)
     return reading.read(kind), reading
 
 
@@ -727,17 +705,7 @@ def _explained(problem: Any, name: str, owner: Any) -> WrongValueError:  # noqa:
 
 def homes(schema: type[Section]) -> dict[str, str]:
     """Return the path above each key that stands below another one: ``processing.relative`` for ``grubbs_alpha``."""
-    found: dict[str, str] = {}
-
-    def walk(section: type[Section], above: str) -> None:
-        for name, described in section.model_fields.items():
-            if above:
-                found.setdefault(name, above)
-            if is_section(inner := bare(described.annotation)):
-                walk(inner, f"{above}.{name}" if above else name)
-
-    walk(schema, "")
-    return found
+    return {name: above for above, name, _ in reversed([*schema.described()]) if above}
 
 
 def form_of(node: Node | None) -> Form:
