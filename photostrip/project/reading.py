@@ -245,9 +245,8 @@ def parse(text: str, file: str, findings: Findings) -> Node | None:
     except UnicodeEncodeError:
         findings.add(Fault("is not valid Unicode text", "encoding", file))
     except RecursionError:
-        findings.add(
-            Place(file, 1, 1).fault(f"values are nested more than {DEEPEST} deep", "yaml", expected="a project")
-        )
+        message = f"values are nested more than {DEEPEST} deep"
+        findings.add(Place(file, 1, 1).fault(message, "yaml", expected="a project"))
     except InputError as error:  # no document that a person would write
         findings.add(*error.faults)
     return None
@@ -257,9 +256,7 @@ class _Tree:
     """Makes a tree of texts of what PyYAML composed; what an alias stands for is copied, and counts each time."""
 
     def __init__(self, file: str, findings: Findings) -> None:
-        self.file, self.findings = file, findings
-        self.sound = True
-        self.values = 0
+        self.file, self.findings, self.values, self.sound = file, findings, 0, True
 
     def whole(self, composed: yaml.Node) -> Node | None:
         """Return the tree, None when it cannot be trusted; raises InputError for what no person would write."""
@@ -279,24 +276,19 @@ class _Tree:
             tag = given.tag.replace("tag:yaml.org,2002:", "!!")
             self.findings.add(place.fault(f"the tag {shown(tag)} cannot be used", "tag", fix="remove it"))
         if isinstance(given, yaml.ScalarNode):
-            return Node(self._text(given, place), place)
+            text = given.value.strip()
+            if text != given.value and given.style in {"'", '"'}:
+                self.findings.notes.append(place.note("stray-blanks", f"blanks around `{shown(given.value)}` removed"))
+            return Node(text, place)
         if len(above) >= DEEPEST:
-            message = f"values are nested more than {DEEPEST} deep"
-            raise InputError(place.fault(message, "yaml", expected="a project"))
+            raise InputError(place.fault(f"values are nested more than {DEEPEST} deep", "yaml", expected="a project"))
+        inside = (*above, given)
         if isinstance(given, yaml.SequenceNode):
-            return Node([self._node(each, (*above, given)) for each in given.value], place)
+            return Node([self._node(each, inside) for each in given.value], place)
         node = Node({}, place)
         for key, value in given.value:
-            self._enter(node, self._node(key, (*above, given)), self._node(value, (*above, given)))
+            self._enter(node, self._node(key, inside), self._node(value, inside))
         return node
-
-    def _text(self, given: yaml.ScalarNode, place: Place) -> str:
-        text: str = given.value
-        stripped = text.strip()
-        if stripped != text and given.style in {"'", '"'}:
-            message = f"blanks around `{shown(text)}` removed"
-            self.findings.notes.append(place.note("stray-blanks", message))
-        return stripped
 
     def _enter(self, parent: Node, key: Node, value: Node) -> None:
         """Put a value under its key; the first of two equal keys counts."""
@@ -391,25 +383,20 @@ class Reading:
     files: list[str]  # every file that was read, the file itself first
 
     @classmethod
-    def of(cls, file: str, assignments: Sequence[str] = ()) -> Reading:
-        """Read a file and apply what the command line sets, or raise why it is no YAML."""
+    def of(cls, kind: type[Section], path: Path | None, assignments: Sequence[str] = ()) -> Reading:
+        """Read a file and apply what the command line sets, or make one of that; raises why it is no YAML."""
         findings, files = Findings(), list[str]()
-        root = read_tree(file, findings, files)
+        if path is None:
+            place, number = (
+                Place(COMMAND_LINE),
+                next(name for name in kind.model_fields if name.startswith("photostrip")),
+            )
+            root: Node | None = Node({number: Node("1", place)}, place, {number: place})
+        else:
+            root = read_tree(str(path), findings, files)
         if root is None:
             raise InputError(findings.faults)
-        return cls(file=file, root=root, findings=findings, files=files).with_set(assignments)
-
-    @classmethod
-    def of_keys(cls, kind: type[Section], path: Path | None, assignments: Sequence[str]) -> Reading:
-        """Read a file of which every key can be set, or make one of assignments alone."""
-        if path is not None:
-            return cls.of(str(path), assignments)
-        place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name.startswith("photostrip"))
-        root = Node({number: Node("1", place)}, place, {number: place})
-        return cls(file=COMMAND_LINE, root=root, findings=Findings(), files=[]).with_set(assignments)
-
-    def with_set(self, assignments: Sequence[str]) -> Reading:
-        return replace(self, root=override(self.root, assignments, self.findings))
+        return cls(COMMAND_LINE if path is None else str(path), override(root, assignments, findings), findings, files)
 
     def checked(self, kind: type[S]) -> S | None:
         """Return the file with types and defaults; None when there are faults."""
@@ -469,7 +456,7 @@ class Reading:
 
 def read_keys(kind: type[S], path: Path | None, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
     """Read a file of which every key can be set, or make one of assignments alone, or raise every fault."""
-    reading = Reading.of_keys(kind, path, assignments)
+    reading = Reading.of(kind, path, assignments)
     return reading.read(kind), reading
 
 

@@ -694,7 +694,7 @@ class Survey:
 
 def load_survey(path: Path | None, overrides: Sequence[str] = ()) -> Survey:
     """Read a terrestrial project and its table, or raise every fault of every file."""
-    reading = Reading.of_keys(DisplacementFile, path, overrides)
+    reading = Reading.of(DisplacementFile, path, overrides)
     checked = reading.checked(DisplacementFile)
     cameras = _cameras(checked, reading) if checked is not None else []
     series = _series(checked, reading, cameras)
