@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 
 import numpy as np
 
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
-from photostrip.formats.simulation import project_files
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec
 

@@ -102,13 +102,13 @@ def blocks(folder: Path) -> list[dict[str, bytes]]:
     given = {"photos.csv": (folder / "found" / "photos.csv").read_bytes()}
     files = {name: data for name, data in _files_of(path).items() if name in {"observations.csv", "control.csv"}}
     project = path.read_text(encoding="utf-8")
-    listed = re.search(r"  - id: .*\n    camera: (.*)\n    photos: \[(.*)\]\n", project)
+    listed = re.search(r"- id: .*\n  camera: (.*)\n  photos: \[([^]]*)\]\n", project)
     if listed is None:
         raise RuntimeError("the project lists no photos")
     table = '  file: photos.csv\n  crs: "local"\n  axes: [east, north, up]\n'
     observed = f"orientations:\n{table}  role: observed\n  sigma: [0.1, 0.1, 0.1]\n  sigma_angles: [0.01, 0.01, 0.01]\n"
     single = "".join(
-        f"  - {{id: S{number}, camera: {listed[1]}, photos: [{photo}]}}\n"
+        f"- {{id: S{number}, camera: {listed[1]}, photos: [{photo}]}}\n"
         for number, photo in enumerate(listed[2].split(", "))
     )
     alone = project.replace(listed[0], single) + f"orientations:\n{table}  role: approximate\n"

@@ -10,8 +10,8 @@ import os
 from pathlib import Path
 
 from photostrip.comparison import baseline_of
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.result_json import to_json
-from photostrip.formats.simulation import project_files
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import load_project
 from photostrip.project.simulation import load_specification

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.formats.simulation import project_files
+from photostrip.foreign.simulated import project_files
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.library import result as library
 from photostrip.pipeline.inputs import Settings

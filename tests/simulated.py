@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from photostrip.formats.simulation import model_strips
+from photostrip.foreign.simulated import model_strips
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
 from photostrip.points import PhotoPoints
 from photostrip.strip.corrections import ImageCorrectionSettings

@@ -13,9 +13,10 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
-from typing import Annotated, TextIO
+from typing import Annotated, Any, TextIO
 
 import typer
+import typer.core
 
 from photostrip import __version__
 from photostrip.cli.about import info, schema
@@ -32,21 +33,27 @@ HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 NEW_OBJECTS = 1_000_000  # between two looks of the garbage collector
 COMMANDS: dict[str, tuple[Command, str]] = {
     "init": (init, "photostrip init strip-a"),
-    "convert": (convert, "photostrip convert sparse/0 -o block --sigma 0.7"),
     "check": (check, "photostrip check project.yaml"),
     "run": (run, "photostrip run project.yaml -o result"),
     "batch": (batch, "photostrip batch strips/* -o results -j 4"),
     "report": (report, "photostrip report result/result.json"),
     "statement": (statement, "photostrip statement result --class-plan 15 --class-height 20"),
     "compare": (compare, "photostrip compare result baseline.json --tol exact.yaml"),
-    "simulate": (simulate, "photostrip simulate strip.yaml -o simulated"),
     "plan": (plan, "photostrip plan model --set end_lap_percent=60 --set control.layout=corners"),
+    "simulate": (simulate, "photostrip simulate strip.yaml -o simulated"),
     "step": (step, "photostrip step relative pair.csv --set principal_distance=153 --set base=920 --set unit=m"),
     "terrestrial": (terrestrial, "photostrip terrestrial displacement survey.yaml -o survey.svg"),
     "sources": (sources, "photostrip sources --format md"),
+    "convert": (convert, "photostrip convert sparse/0 -o block --sigma 0.7"),
     "schema": (schema, "photostrip schema -o photostrip.schema.json"),
     "info": (info, "photostrip info --format json"),
 }  # with an example of each
+PURPOSES = {
+    "Daily": "init",
+    "Planning": "plan",
+    "Teaching": "step",
+    "Files": "convert",
+}  # the first command
 ENVIRONMENT = """\
 PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET, PHOTOSTRIP_VERBOSE and PHOTOSTRIP_DEBUG stand in for the options
 of these names; NO_COLOR forbids colours.
@@ -74,9 +81,26 @@ def photostrip(
     DEBUG.set(debug)
 
 
+class Grouped(typer.core.TyperGroup):
+    """A program whose help lists its commands by what they are for."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401, ARG002 (no public types)
+        """Write the commands, those of one purpose below each other."""
+        purposes = {first: purpose for purpose, first in PURPOSES.items()}
+        widest, groups = max(map(len, self.commands)), dict[str, list[tuple[str, str]]]()
+        for name, command in self.commands.items():
+            purpose = purposes.get(name, next(reversed(groups), "Commands"))
+            told = command.get_short_help_str(formatter.width - 6 - widest)  # with the margins
+            groups.setdefault(purpose, []).append((name.ljust(widest), told))
+        for purpose, rows in groups.items():
+            with formatter.section(purpose):
+                formatter.write_dl(rows)
+
+
 def program(commands: Iterable[tuple[str, Command, str]]) -> typer.Typer:
     """Return a program of commands, each with an example."""
     whole = typer.Typer(
+        cls=Grouped,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         no_args_is_help=True,

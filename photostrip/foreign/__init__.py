@@ -8,5 +8,5 @@ a ``tables.ForeignBlock``; ``project`` writes it as a project and says what was 
 programs' files. ``adjusted`` takes out of a result what other programs need, ``exports`` makes their files:
 ``geopackage`` layers on a map, ``orthority`` orientations for orthophotos, ``historix_submission`` orientations and
 points for HISTORIX, ``colmap_model`` a model of COLMAP, ``opensfm_model`` one of OpenSfM, ``cameras`` a block of a
-project.
+project. ``simulated`` writes a simulation as a project with its truth.
 """

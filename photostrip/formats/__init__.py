@@ -2,5 +2,5 @@
 
 - ``files``, ``faults``, ``tables``: bytes and whole files, what is wrong with them and where, CSV and JSON;
 - ``measured``, ``models``, ``terrestrial``: the tables of measured and given coordinates that are read;
-- ``result_json``, ``result_files``, ``simulation``, ``batch``: what goes out.
+- ``result_json``, ``result_files``, ``batch``: what goes out.
 """

@@ -297,7 +297,7 @@ def simulate(
 
 
 def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
-    from photostrip.formats.simulation import project_files, summary
+    from photostrip.foreign.simulated import project_files, summary
     from photostrip.project.simulation import load_specification
 
     specification = load_specification(path, assignments)

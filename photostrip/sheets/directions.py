@@ -14,7 +14,7 @@ from photostrip.arrays import Floats
 from photostrip.notes import counted
 from photostrip.report.page.parts import DASH, Part, Words
 from photostrip.report.page.tables import Cell, Field, fields, written
-from photostrip.sheets.sheet import Fact, Rows, Sheet, by_columns, plain
+from photostrip.sheets.sheet import Fact, Rows, Sheet, by_columns, filled, hidden, plain, table, taken
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.accuracy import Theodolite
 from photostrip.terrestrial.normal_case import (
@@ -260,7 +260,7 @@ def theodolite_sheet(
         text = f"{counted(max(turns), 'round')} (horizontal {turns[0]}, vertical {turns[1]})"
         facts.append(Fact("wanted", wanted, text=text, label=f"for {sigma * MICROMETRES:.4g} µm"))
     columns = (
-        *(Field(f"by_{name}_um", "um 2", shown=False) for name in ("horizontal", "vertical")),
+        *hidden("by_horizontal_um", "by_vertical_um", form="um 2"),
         Field("supported_um", "um 2", "Standard deviation of image coordinates that it supports, µm"),
     )
     values = np.column_stack([image, image.max(axis=1)])
@@ -314,23 +314,14 @@ def orientation_sheet(
         ),
         [_element(*each, unit) for each in zip(found.names, found.values, found.sigma, strict=True)],
     )
-    residuals = Rows(
-        "points",
-        "Residuals",
-        (
-            Field("point"),
-            *fields("v_lambda_arcsec v_beta_arcsec", "arcsec 1", "v_lambda v_beta"),
-            Field("redundancy_lambda", "ratio 2", "redundancy", "lambda"),
-            Field("redundancy_beta", "ratio 2", "redundancy", "beta"),
-            Field("used", head=""),
-        ),
-        [
-            (*row, Cell("" if kept else "rejected", bool(kept)))
-            for row, kept in zip(
-                by_columns(sightings.ids, found.residuals * ARCSECONDS, found.redundancy), found.used, strict=True
-            )
-        ],
-    )
+    columns = [
+        (Field("point"), list(sightings.ids)),
+        *filled(fields("v_lambda_arcsec v_beta_arcsec", "arcsec 1", "v_lambda v_beta"), found.residuals * ARCSECONDS),
+        (Field("redundancy_lambda", "ratio 2", "redundancy", "lambda"), found.redundancy[:, 0]),
+        (Field("redundancy_beta", "ratio 2", "redundancy", "beta"), found.redundancy[:, 1]),
+        (Field("used", head=""), [Cell("" if kept else "rejected", bool(kept)) for kept in found.used]),
+    ]
+    residuals = table("points", "Residuals", columns)
     tests = {"deletion": "p value {0:.2g}, limit {1:.2g}", "stated": "chi-square {0:.3g}, limit {1:.3g}"}
     rejected: list[tuple[Any, ...]] = [
         (sightings.ids[each.row], each.test, each.value, each.limit, *(float(size) * ARCSECONDS for size in each.size))
@@ -340,10 +331,9 @@ def orientation_sheet(
         "rejected",
         "Rejected",
         (
-            Field("point", shown=False),
-            Field("test", shown=False),
-            *_hidden("value limit", "ratio g4"),
-            *_hidden("lambda_arcsec beta_arcsec", "arcsec 1"),
+            *hidden("point", "test"),
+            *hidden("value", "limit", form="ratio g4"),
+            *hidden("lambda_arcsec", "beta_arcsec", form="arcsec 1"),
         ),
         rejected,
         below=[
@@ -358,10 +348,6 @@ def orientation_sheet(
     first = Rows("", "", (), (), below=outside)
     order = [first, elements, residuals, left_out]
     return Sheet("photo-orientation", "Orientation of a photo by directions", facts, order, main="points")
-
-
-def _hidden(keys: str, form: str) -> tuple[Field, ...]:
-    return tuple(Field(key, form, shown=False) for key in keys.split())
 
 
 def _element(name: str, value: float, sigma: float, unit: str) -> tuple[object, ...]:
@@ -380,18 +366,17 @@ def _formed(value: float, form: str) -> Cell:
 
 def cameras_sheet(cameras: dict[str, Phototheodolite]) -> Sheet:
     """Return the cameras that can be named."""
-    rows = [
-        (
-            name,
-            each.principal_distance,
-            *each.principal_point,
-            Cell(DASH if each.format is None else " × ".join(f"{size:.4g}" for size in each.format), each.format),
-        )
-        for name, each in cameras.items()
-    ]
     columns = (
-        Field("camera"),
-        *fields("principal_distance_mm x0_mm z0_mm", "mm g9", "f x0 z0"),
-        Field("format_mm", "mm g4", "format"),
+        Field("camera", of="name"),
+        Field("principal_distance_mm", "mm g9", "f", of="principal_distance"),
+        Field("x0_mm", "mm g9", "x0", of=lambda camera: camera.principal_point[0]),
+        Field("z0_mm", "mm g9", "z0", of=lambda camera: camera.principal_point[1]),
+        Field("format_mm", "mm g4", "format", of=_format),
     )
-    return Sheet("cameras", "Cameras", (), [Rows("cameras", "", columns, rows)])
+    named = [replace(camera, name=name) for name, camera in cameras.items()]
+    return Sheet("cameras", "Cameras", (), [table("cameras", "", taken(columns, named))])
+
+
+def _format(camera: Phototheodolite) -> Cell:
+    size = camera.format
+    return Cell(DASH if size is None else " × ".join(f"{each:.4g}" for each in size), size)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from photostrip.report.page.parts import DASH, Words
 from photostrip.report.page.tables import Cell, Field, fields
 from photostrip.result.numbers import natural_rank
 from photostrip.sheets.directions import camera_facts
-from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden, plain
+from photostrip.sheets.sheet import Fact, Rows, Sheet, filled, hidden, plain, table
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import OneStation, OneStationResult
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
@@ -109,17 +111,10 @@ def _rms_um(values: Floats) -> float:
 
 
 def _stations(survey: Survey, result: Monitoring) -> Rows:
-    order = list(survey.frame.order)
-    columns = (
-        Field("side", shown=False),
-        Field("camera", shown=False),
-        *(Field(axis, "m 4", shown=False) for axis in "xyz"),
-    )
-    rows = [
-        (side, camera.name, *centre[order])
-        for side, camera, centre in zip(SIDES, survey.cameras, result.pair.centers, strict=True)
-    ]
-    return Rows("stations", "", columns, rows)
+    names = list(zip(SIDES, (camera.name for camera in survey.cameras), strict=True))
+    centers = np.array(result.pair.centers)[:, list(survey.frame.order)]
+    columns = filled(hidden("side", "camera"), names) + filled(hidden("x", "y", "z", form="m 4"), centers)
+    return table("stations", "", columns)
 
 
 def _cameras(result: Monitoring) -> Rows:
@@ -130,16 +125,16 @@ def _cameras(result: Monitoring) -> Rows:
         *TURNED,
         *TURN_SIGMAS,
         Field("stable_points", "count", "points"),
-        Field("redundancy", shown=False),
+        *hidden("redundancy"),
         Field("statistic", "ratio 1", "test"),
         Field("limit", "ratio 1"),
         Field("turned", head=""),
-        Field("removed", shown=False),
+        *hidden("removed"),
     )
     return Rows(
         "cameras",
         "Cameras" if determined else "",
-        columns if determined else [Field(each.key, each.form, shown=False) for each in columns],
+        columns if determined else [replace(each, shown=False) for each in columns],
         [camera_row(result, state) for state in result.cameras],
         note="Turns against the first epoch in the camera's own axes; ccw: counter-clockwise for the photographer.",
     )
@@ -164,10 +159,10 @@ def _columns(axes: Sequence[str]) -> tuple[Field, ...]:
         *along,
         *fields("sigma_x sigma_y sigma_z", "m 3", "± ± ±"),
         Field("length", "m 3"),
-        *(Field(key, "m 3", shown=False) for key in ("ellipse_major", "ellipse_minor")),
+        *hidden("ellipse_major", "ellipse_minor", form="m 3"),
         Field("", "m 3", "ellipse", rank=1),
         Field("azimuth_deg", "deg 0", "azimuth", rank=1),
-        *(Field(f"covariance_{pair}", "m² g6", shown=False) for pair in COVARIANCES),
+        *hidden(*(f"covariance_{pair}" for pair in COVARIANCES), form="m² g6"),
         Field("statistic", "ratio 1", "test"),
         Field("significant", head=""),
     )
@@ -230,25 +225,18 @@ def _epochs(result: Monitoring, frame: ReportFrame) -> Iterator[Rows]:
 
 def _positions(result: Monitoring, frame: ReportFrame) -> Rows:
     """Give the coordinates of all points in all epochs."""
-    order = list(frame.order)
-    columns = (
-        Field("point"),
-        Field("epoch"),
-        *(Field(axis, "m 3", name) for axis, name in zip("xyz", frame.axes, strict=True)),
-        *fields("sigma_x sigma_y sigma_z", "m 4", "± ± ±"),
+    series, order, rows = result.series, list(frame.order), _points(result)
+    values, sigmas = (
+        np.stack([getattr(each, name)[rows][:, order] for each in result.positions], axis=1).reshape(-1, len(order))
+        for name in ("values", "sigma")
     )
-    rows = [
-        (
-            result.series.points[row],
-            epoch,
-            *result.positions[number].values[row][order],
-            *result.positions[number].sigma[row][order],
-            result.parallax[number, row] * MICROMETRES,
-        )
-        for row in _points(result)
-        for number, epoch in enumerate(result.series.epochs)
+    columns = [
+        *filled((Field("point"), Field("epoch")), list(product([series.points[row] for row in rows], series.epochs))),
+        *filled([Field(axis, "m 3", name) for axis, name in zip("xyz", frame.axes, strict=True)], values),
+        *filled(fields("sigma_x sigma_y sigma_z", "m 4", "± ± ±"), sigmas),
+        (Field("parallax_um", "um 1", "p vertical"), (result.parallax[:, rows].T * MICROMETRES).ravel()),
     ]
-    return Rows("positions", "Positions", (*columns, Field("parallax_um", "um 1", "p vertical")), rows)
+    return table("positions", "Positions", columns)
 
 
 def _rates(result: Monitoring, frame: ReportFrame) -> Rows:
@@ -283,8 +271,7 @@ def _rates(result: Monitoring, frame: ReportFrame) -> Rows:
 def _notes(notes: Iterable[tuple[str, str, str]]) -> Rows:
     listed = list(notes)
     words = [Words(f"{severity}: {text}", "look" if severity == "warning" else "", "-") for _, severity, text in listed]
-    columns = tuple(Field(key, shown=False) for key in ("code", "severity", "message"))
-    return Rows("notes", "Notes", columns, listed, below=words)
+    return Rows("notes", "Notes", hidden("code", "severity", "message"), listed, below=words)
 
 
 def one_station_sheet(
@@ -301,24 +288,21 @@ def one_station_sheet(
         found |= {f"sigma_{name}_arcsec": plain(value, "arcsec 1") for name, value in zip(TURNS, sigmas, strict=True)}
         statistic = {"statistic": plain(turn.statistic, "ratio 2")}
         facts.append(Fact("turn", found | statistic, text=f"{text}; taken out", label="camera turned"))
-    rows = []
-    for row, name in enumerate(measured.points):
-        moved, stable = bool(result.statistic[row] > result.limit[row]), bool(measured.stable[row])
-        tests = (result.statistic[row], result.limit[row], Cell("stable" if stable else VERDICTS[moved], moved))
-        seen = Cell("in space" if result.components[row] == 3 else "across the ray", result.components[row])
-        length = float(np.linalg.norm(result.values[row]))
-        rows.append((name, *result.values[row], *result.sigma[row], length, *tests, seen, stable))
-    columns = (
-        Field("point"),
-        *(Field(f"d{axis}", "m +3", f"d {name}") for axis, name in zip("xyz", ("east", "north", "up"), strict=True)),
-        *fields("sigma_x sigma_y sigma_z", "m 3", "± ± ±"),
-        Field("length", "m 3"),
-        Field("statistic", "ratio 1", "test"),
-        Field("limit", "ratio 1", rank=1),
-        Field("significant", head=""),
-        Field("components", head="seen"),
-        Field("stable", shown=False),
-    )
+    moved, stable = result.statistic > result.limit, measured.stable.tolist()
+    verdicts = ["stable" if each else VERDICTS[bool(gone)] for each, gone in zip(stable, moved, strict=True)]
+    seen = {2: "across the ray", 3: "in space"}
+    along = [Field(f"d{axis}", "m +3", f"d {name}") for axis, name in zip("xyz", ("east", "north", "up"), strict=True)]
+    columns = [
+        (Field("point"), list(measured.points)),
+        *filled(along, result.values),
+        *filled(fields("sigma_x sigma_y sigma_z", "m 3", "± ± ±"), result.sigma),
+        (Field("length", "m 3"), np.linalg.norm(result.values, axis=1)),
+        (Field("statistic", "ratio 1", "test"), result.statistic),
+        (Field("limit", "ratio 1", rank=1), result.limit),
+        (Field("significant", head=""), list(map(Cell, verdicts, moved.tolist()))),
+        (Field("components", head="seen"), [Cell(seen[number], number) for number in result.components]),
+        (Field("stable", shown=False), stable),
+    ]
     note = "test: chi-square of what is seen; axes are right, ahead, up of the camera where alpha is 0"
-    points = Rows("points", "Displacements", columns, rows, note=note)
+    points = table("points", "Displacements", columns, note=note)
     return Sheet("one-station", "Displacements from one station", facts, [points])

@@ -14,7 +14,7 @@ from photostrip.planning.strip_design import BestPlaces, DesignReport, Outcome, 
 from photostrip.report.page.parts import DASH, Words
 from photostrip.report.page.tables import Cell, Field, fields, written
 from photostrip.result.numbers import rms
-from photostrip.sheets.sheet import Fact, Rows, Sheet, plain
+from photostrip.sheets.sheet import Fact, Rows, Sheet, plain, table, taken
 
 PHOTOS_SHOWN = 11  # columns of the tables along a strip
 PLACES_SHOWN = 6
@@ -75,32 +75,26 @@ def strip_sheet(name: str, report: DesignReport) -> Sheet:
 
 def _layouts(report: DesignReport) -> Rows:
     spots = {each.layout.name: each.spots for each in report.outcomes}
-    return Rows(
-        "layouts",
-        "",
-        (
-            Field("name", head="layout"),
-            Field("count", "count", "points"),
-            Field("sigma_m", head="σ of control", below="along, across, up, m"),
-            Field("gnss_sigma_m", head="σ of perspective centres", below="m"),
-            Field("gnss_offset", shown=False),
-            Field("points", head="at photo/row", rank=1),
+
+    def at(layout: ControlLayout) -> Cell:
+        chosen = spots[layout.name]
+        places = map(_spot, chosen, report.strip.xyz[numbers_of(report.strip, chosen)])
+        return Cell(listed(map(_at, chosen), PLACES_SHOWN), list(places))
+
+    columns = (
+        Field("name", head="layout"),
+        Field("count", "count", "points", of=lambda layout: len(spots[layout.name])),
+        Field(
+            "sigma_m",
+            head="σ of control",
+            below="along, across, up, m",
+            of=lambda each: Cell(written(each.sigma, "m 3"), each.sigma),
         ),
-        [
-            (
-                each.name,
-                len(spots[each.name]),
-                Cell(written(each.sigma, "m 3"), each.sigma),
-                _gnss(each),
-                None if each.gnss is None else each.gnss_offset,
-                Cell(
-                    listed(map(_at, spots[each.name]), PLACES_SHOWN),
-                    [*map(_spot, spots[each.name], report.strip.xyz[numbers_of(report.strip, spots[each.name])])],
-                ),
-            )
-            for each in report.design.layouts
-        ],
+        Field("gnss_sigma_m", head="σ of perspective centres", below="m", of=_gnss),
+        Field("gnss_offset", shown=False, of=lambda each: None if each.gnss is None else each.gnss_offset),
+        Field("points", head="at photo/row", rank=1, of=at),
     )
+    return table("layouts", "", taken(columns, report.design.layouts))
 
 
 def _gnss(layout: ControlLayout) -> Cell:

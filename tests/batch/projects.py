@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.batch.evaluation import evaluate
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
-from photostrip.formats.simulation import project_files
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Points, Spec
 from tests.source_tree import ROOT

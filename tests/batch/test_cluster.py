@@ -255,7 +255,7 @@ def test_a_grid_travels_with_its_project(tmp_path: Path, monkeypatch: pytest.Mon
     (project,) = write_projects(tmp_path / "strips", 1)
     monkeypatch.chdir(tmp_path)
     path = Path(project).relative_to(tmp_path)
-    crs = '"+proj=utm +zone=33 +datum=WGS84 +geoidgrids=own.gtx +type=crs"\n    height: orthometric'
+    crs = '"+proj=utm +zone=33 +datum=WGS84 +geoidgrids=own.gtx +type=crs"\n  height: orthometric'
     path.write_text(path.read_text(encoding="utf-8").replace('"EPSG:32633"', crs), encoding="utf-8")
     write_gtx(path.parent / "own.gtx", np.full((11, 11), 45.0), south=40.0, west=10.0, step=1.0)
     parcel = pack(path)

@@ -30,7 +30,7 @@ FLAT = "flight: {photos: 5, attitude_sigma_deg: [0, 0, 0]}\nterrain: {relief: 0}
 UNDETERMINED = ("--set", "processing.self_calibration=[principal_distance]")  # is flown height, over flat ground
 BANDS = "flight: {photos: 3}\ncontrol: {bands: 3, per_band: 3}\n"
 SINGLES = {'"1001", "1002", "1003"]\n': "".join(['"1001"]\n', *(
-    f'  - {{id: S{n}, camera: film, photos: ["100{n}"]}}\n' for n in (2, 3)
+    f'- {{id: S{n}, camera: film, photos: ["100{n}"]}}\n' for n in (2, 3)
 )])}  # each photo a strip of its own  # fmt: skip
 
 
@@ -81,7 +81,7 @@ def test_two_strips_of_three_photos_on_four_corners(answer: Answer, run: Run, tm
 
 def test_a_photo_that_is_a_strip_of_its_own(answer: Answer, run: Run, tmp_path: Path) -> None:
     spec = "flight: {photos: 4}\ncontrol: {bands: 2, per_band: 3, check: 6}\n"
-    single = '"1003"]\n  - {id: B, camera: film, photos: ["1004"]}\n'
+    single = '"1003"]\n- {id: B, camera: film, photos: ["1004"]}\n'
     document = run(simulated(answer, tmp_path, spec, **{'"1003", "1004"]\n': single}))
     assert document["adjustment"] == "bundle"
     assert [photo["id"] for photo in document["photos"]] == ["1001", "1002", "1003", "1004"]

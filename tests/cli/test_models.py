@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
 from photostrip.formats.result_json import read_result
-from photostrip.formats.simulation import project_files
 from photostrip.simulation import Flight, Models, Spec, simulate
 from tests.loops import nonempty
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
-from photostrip.formats.simulation import project_files
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import load_project
 from photostrip.simulation.simulation import simulate

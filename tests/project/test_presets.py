@@ -14,8 +14,8 @@ import pytest
 
 from photostrip import simulation
 from photostrip.cli.main import main as photostrip
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.result_json import read_result
-from photostrip.formats.simulation import project_files
 from photostrip.simulation.simulation import simulate as simulated
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, Sample, sample
 from tests.source_tree import ROOT

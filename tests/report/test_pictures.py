@@ -16,8 +16,8 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel, chart, nice
-from photostrip.report.pictures.footprints import footprint_pictures, footprints
 from photostrip.report.pictures.places import plan_of, rays_of
+from photostrip.report.pictures.plan import footprint_pictures, footprints
 from photostrip.report.pictures.result import picture_files, pictures_of
 from photostrip.result.numbers import MATRIX
 from photostrip.simulation import Models

@@ -1,7 +1,7 @@
 """Tables of a page: their columns described once, those of a result by ``result/quantities.txt``.
 
 The form of a column is its unit and how its numbers are printed: ``"m 3"``; ``"m +3"`` with a sign, ``"mm g9"`` by
-digits, ``"mm² e4"`` as a power, `` %1`` as percent; ``"ratio 2"`` has no unit; words have no form.
+digits, ``"mm² e4"`` as a power, ``" %1"`` as percent; ``"ratio 2"`` has no unit; words have no form.
 """
 
 from __future__ import annotations
@@ -150,12 +150,11 @@ def fields(keys: str, form: str, heads: str = "", below: str | None = None, rank
     return tuple(Field(key, form, name, below, rank) for key, name in zip(keys.split(), names, strict=True))
 
 
-def tabulated(columns: Sequence[Field], rows: Iterable[Sequence[Any]], note: str = "", foot: Foot = ()) -> Table:
+def tabulated(columns: Sequence[Field], rows: Iterable[Sequence[Any]], note: str = "") -> Table:
     """Return a table of rows, each with a value for every column."""
     shown = [(place, each) for place, each in enumerate(columns) if each.shown]
     cells = tuple(tuple(written(row[place], each.form) for place, each in shown) for row in rows)
-    end = tuple(tuple(line.get(each.key, "") for _, each in shown) for line in foot)
-    return Table(tuple(each.column for _, each in shown), cells, end, note)
+    return Table(tuple(each.column for _, each in shown), cells, note=note)
 
 
 Foot = Sequence[Mapping[str, str]]  # texts of the last lines by the keys of their columns

@@ -14,7 +14,7 @@ import photostrip
 from benchmarks import planted
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
-from photostrip.formats.simulation import project_files
+from photostrip.foreign.simulated import project_files
 from photostrip.notes import LOST_SAY
 from photostrip.pipeline import gate
 from photostrip.pipeline.inputs import Settings

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Distortion
+from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
-from photostrip.formats.simulation import project_files
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.project.loading import load_project
 from photostrip.result.table import rows_of
@@ -82,9 +82,9 @@ cameras:
       "F7": [0.0, 110.0]
       "F8": [110.0, 0.0]
 strips:
-  - id: "A"
-    camera: "film"
-    photos: ["1001", "1002", "1003"]
+- id: "A"
+  camera: "film"
+  photos: ["1001", "1002", "1003"]
 observations:
   file: observations.csv
   unit: mm
@@ -93,10 +93,10 @@ observations:
 fiducial_measurements:
   file: fiducials.csv
 control:
-  - file: control.csv
-    crs: "local"
-    axes: [east, north, up]
-    sigma: [0.05, 0.05, 0.08]
+- file: control.csv
+  crs: "local"
+  axes: [east, north, up]
+  sigma: [0.05, 0.05, 0.08]
 """
 
 
@@ -237,7 +237,7 @@ def test_numbers_have_fixed_decimals() -> None:
 @pytest.mark.slow
 def test_the_same_specification_gives_the_same_bytes() -> None:
     """In two processes, with different orders of sets and dictionaries of texts."""
-    code = "from tests.formats.test_simulation import digests\nprint(*digests(), sep='\\n')"
+    code = "from tests.foreign.test_simulated import digests\nprint(*digests(), sep='\\n')"
     environment = {"PYTHONHASHSEED": "1"}
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, text=True, check=True

@@ -7,23 +7,26 @@ without errors to a thousandth of that or less.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.camera import Camera
+from photostrip.foreign.project import in_project
 from photostrip.formats.result_json import to_json
-from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import angles
 from photostrip.notes import Document, counted
+from photostrip.number_columns import as_fixed, as_texts, joined, repeated
 from photostrip.pipeline.inputs import ModelStrip
 from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.project.resolved import yaml_text
+from photostrip.project.sections import Text
 from photostrip.result.numbers import MATRIX, to_decimals
 from photostrip.result.table import Table
 from photostrip.simulation import InjectedError, Simulation
@@ -33,23 +36,12 @@ GROUND_STEP, GROUND_STEP_FREE = 1e-4, 1e-7  # metres, likewise
 MM_PER = {"mm": 1.0, "um": 1e-3, "0.1um": 1e-4}
 
 
-def on_one_line(value: object) -> str:
-    """Write a text, number or list on one line, as JSON and as YAML."""
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _table(header: str, rows: Iterable[tuple[str, ...]]) -> str:
-    return "\n".join([header, *(",".join(row) for row in rows)]) + "\n"
-
-
-def _fixed(values: Floats, decimals: int | list[int]) -> list[list[str]]:
-    """Numbers with fixed decimals, given for all columns or for each; empty where there is none; never -0."""
-    places = [decimals] * values.shape[1] if isinstance(decimals, int) else decimals
-    columns = []
-    for column, count in zip(values.T, places, strict=True):
-        cleared = np.round(column, count) + 0.0
-        columns.append(["" if math.isnan(value) else f"{value:.{count}f}" for value in cleared.tolist()])
-    return [list(row) for row in zip(*columns, strict=True)]
+def _table(header: str, ids: Sequence[Sequence[str]], values: Floats, decimals: list[int], *more: Sequence[str]) -> str:
+    """Write a table: ids, numbers with the decimals of each column, never -0, empty where there is none; then words."""
+    numbers = [as_fixed(to_decimals(column, each), each, "") for column, each in zip(values.T, decimals, strict=True)]
+    columns = [*map(as_texts, ids), *numbers, *map(as_texts, more)]
+    comma = repeated(",", len(values))
+    return f"{header}\n{joined([cells for column in columns for cells in (comma, column)][1:], chr(10))}\n"
 
 
 def _decimals(step: float) -> int:
@@ -77,22 +69,19 @@ def measurements_csv(simulation: Simulation, measured: PhotoPoints, target: str)
     if image_origin(simulation) == "top-left":
         xy = xy + np.asarray(spec.format) / 2.0
     step = (IMAGE_STEP if spec.image.sigma_um else IMAGE_STEP_FREE) / unit
-    cells = _fixed(xy / unit, _decimals(step))
     photos = [measured.photo_ids[k] for k in measured.photo.tolist()]
     points = [measured.point_ids[k] for k in measured.point.tolist()]
-    rows = ((photo, point, *row) for photo, point, row in zip(photos, points, cells, strict=True))
-    return _table(f"photo,{target},x,y", rows)
+    return _table(f"photo,{target},x,y", (photos, points), xy / unit, [_decimals(step)] * 2)
 
 
 def models_csv(simulation: Simulation, measured: ModelPoints) -> str:
     """Model coordinates in mm; a centre has the id of its photo."""
     spec = simulation.spec.models
     step = IMAGE_STEP if spec is not None and any(spec.sigma_um) else IMAGE_STEP_FREE
-    cells, points = _fixed(measured.xyz, _decimals(step)), len(measured.point_ids)
+    points = len(measured.point_ids)
     models = [measured.model_ids[k] for k in measured.model.tolist()]
     names = [measured.point_ids[k] if k < points else measured.photo_ids[k - points] for k in measured.node.tolist()]
-    rows = ((model, name, *row) for model, name, row in zip(models, names, cells, strict=True))
-    return _table("model,point,x,y,z", rows)
+    return _table("model,point,x,y,z", (models, names), measured.xyz, [_decimals(step)] * 3)
 
 
 def ground_decimals(frame: GroundFrame, step: float) -> list[int]:
@@ -108,11 +97,10 @@ def control_csv(simulation: Simulation, number: int, frame: GroundFrame) -> str:
     control = simulation.control.take(simulation.control.frame == number)
     noise = simulation.spec.control.noise
     step = GROUND_STEP_FREE if noise is not None and not any(noise) else GROUND_STEP
-    cells = _fixed(frame.user_from_internal(control.enu), ground_decimals(frame, step))
+    xyz = frame.user_from_internal(control.enu)
     roles = ["check" if check else "control" for check in control.check.tolist()]
     uses = [_use(row) for row in control.use.tolist()]
-    rows = ((name, *xyz, use, role) for name, xyz, use, role in zip(control.ids, cells, uses, roles, strict=True))
-    return _table("point,x,y,z,use,role", rows)
+    return _table("point,x,y,z,use,role", (control.ids,), xyz, ground_decimals(frame, step), uses, roles)
 
 
 def _use(given: list[bool]) -> str:
@@ -122,11 +110,10 @@ def _use(given: list[bool]) -> str:
 
 def gnss_csv(simulation: Simulation, positions: Floats, frame: GroundFrame) -> str:
     """Measured perspective centres, with their standard deviations in metres."""
-    cells = _fixed(frame.user_from_internal(positions), ground_decimals(frame, GROUND_STEP))
-    gnss = simulation.spec.gnss
-    sigma = [f"{gnss.sigma[k]:g}" for k in frame.order] if gnss is not None else []
-    rows = ((photo, *xyz, *sigma) for photo, xyz in zip(simulation.truth.photo_ids, cells, strict=True))
-    return _table("photo,x,y,z,sx,sy,sz", rows)
+    gnss, photos = simulation.spec.gnss, simulation.truth.photo_ids
+    sigma = [[f"{gnss.sigma[k]:g}"] * len(photos) for k in frame.order] if gnss is not None else []
+    xyz = frame.user_from_internal(positions)
+    return _table("photo,x,y,z,sx,sy,sz", (photos,), xyz, ground_decimals(frame, GROUND_STEP), *sigma)
 
 
 TRUE_STEP = 1e-7  # metres to which the truth is rounded
@@ -246,100 +233,69 @@ def control_file(number: int) -> str:
 
 
 def _project(simulation: Simulation) -> str:
-    """Write the project file. Every text stands in quotation marks, as JSON writes it, which YAML reads."""
-    spec = simulation.spec
-    lines = ["photostrip: 1", f"name: {on_one_line(spec.name)}"]
-    lines += _of_photos(simulation) if simulation.models is None else _of_models(simulation, simulation.models)
-    lines += ["control:"]
-    for number, frame in enumerate(simulation.frames):
-        lines += _listed(control_file(number), frame, spec.control.sigma, "  - ", "    ")
+    spec, frames = simulation.spec, simulation.frames
+    lists = enumerate(frames)
+    project: Document = {
+        "photostrip": 1,
+        "name": Text(spec.name),
+        **(_of_photos(simulation) if simulation.models is None else _of_models(simulation, simulation.models)),
+        "control": [_listed(control_file(number), frame, spec.control.sigma) for number, frame in lists],
+    }
     if spec.gnss is not None and spec.gnss.use:
-        lines += ["camera_positions:", *_listed("gnss.csv", simulation.frames[0], spec.gnss.sigma, "  ", "  ")]
+        project["camera_positions"] = _listed("gnss.csv", frames[0], spec.gnss.sigma)
     if spec.refraction:
-        lines += ["processing:", "  refraction: true"]
-    return "\n".join(lines) + "\n"
+        project["processing"] = {"refraction": True}
+    return yaml_text(project)
 
 
-def _of_models(simulation: Simulation, measured: ModelPoints) -> list[str]:
-    lines = ["strips:"]
-    listed = simulation.spec.models is not None and not simulation.spec.models.centers
-    for strip in model_strips(simulation, measured):
-        lines += [f"  - id: {on_one_line(strip.id)}", f"    photos: {on_one_line(strip.photos)}"]
-        if listed:  # without centres nothing else tells which photos a model shows
-            lines += [f"    models: {on_one_line(strip.models)}"]
-    lines += ["models:", "  file: models.csv", "  unit: mm"]
-    if simulation.spec.models is not None and simulation.spec.models.hand != "right-handed":
-        lines += [f"  axes: {simulation.spec.models.hand}"]
-    center = measured.node >= len(measured.point_ids)
+def _of_models(simulation: Simulation, measured: ModelPoints) -> Document:
+    spec, center = simulation.spec.models, measured.node >= len(measured.point_ids)
+    # without centres nothing else tells which photos a model shows
+    listed = spec is not None and not spec.centers
+    strips = [
+        {"id": Text(strip.id), "photos": _texts(strip.photos)} | ({"models": _texts(strip.models)} if listed else {})
+        for strip in model_strips(simulation, measured)
+    ]
+    models: Document = {"file": "models.csv", "unit": "mm"}
+    if spec is not None and spec.hand != "right-handed":
+        models["axes"] = spec.hand
     for key, rows in (("sigma", ~center), ("center_sigma", center)):
         if rows.any():
-            lines += [f"  {key}: {on_one_line([float(f'{value:.6g}') for value in measured.sigma[rows][0].tolist()])}"]
-    return lines
+            models[key] = [float(f"{value:.6g}") for value in measured.sigma[rows][0].tolist()]
+    return {"strips": strips, "models": models}
 
 
-def _of_photos(simulation: Simulation) -> list[str]:
-    """Lines of cameras, strips and image coordinates."""
-    spec = simulation.spec
-    lines = ["cameras:", *_camera(spec.camera), "strips:"]
-    for name, photos in simulation.strips:
-        lines += [
-            f"  - id: {on_one_line(name)}",
-            f"    camera: {on_one_line(spec.camera.name)}",
-            f"    photos: {on_one_line(photos)}",
-        ]
-    unit = unit_size(spec.camera, spec.image.unit)
-    sigma = float(simulation.observations.sigma[0, 0]) / unit
-    lines += [
-        "observations:",
-        "  file: observations.csv",
-        f"  unit: {spec.image.unit}",
-        f"  y_axis: {spec.image.y_axis}",
-    ]
-    if origin := image_origin(simulation):
-        lines += [f"  origin: {origin}"]
-    lines += [f"  sigma: {sigma:.6g}"]
-    if simulation.fiducials is not None:
-        lines += ["fiducial_measurements:", "  file: fiducials.csv"]
-    return lines
+def _of_photos(simulation: Simulation) -> Document:
+    """Return cameras, strips and image coordinates."""
+    spec, origin, camera = simulation.spec, image_origin(simulation), Text(simulation.spec.camera.name)
+    sigma = float(simulation.observations.sigma[0, 0]) / unit_size(spec.camera, spec.image.unit)
+    observations = {"file": "observations.csv", "unit": spec.image.unit, "y_axis": spec.image.y_axis}
+    of_marks = {} if simulation.fiducials is None else {"fiducial_measurements": {"file": "fiducials.csv"}}
+    return {
+        "cameras": {camera: in_project(spec.camera)},
+        "strips": [
+            {"id": Text(name), "camera": camera, "photos": _texts(photos)} for name, photos in simulation.strips
+        ],
+        "observations": observations | ({"origin": origin} if origin else {}) | {"sigma": float(f"{sigma:.6g}")},
+        **of_marks,
+    }
 
 
-def _camera(camera: Camera) -> list[str]:
-    lines = [
-        f"  {on_one_line(camera.name)}:",
-        f"    principal_distance: {camera.principal_distance!r}",
-        f"    principal_point: {on_one_line(camera.principal_point)}",
-        f"    format: {on_one_line(camera.format)}",
-    ]
-    if camera.pixel_size is not None:
-        lines += [f"    pixel_size: {camera.pixel_size!r}"]
-    if camera.fiducials:
-        lines += [
-            "    fiducials:",
-            *(f"      {on_one_line(mark)}: {on_one_line(xy)}" for mark, xy in camera.fiducials.items()),
-        ]
-    if camera.distortion is not None:
-        shape = asdict(camera.distortion)
-        names = ("k", "p", "b") if camera.distortion.model == "brown" else ("radius", "distortion")
-        lines += ["    distortion:", f"      model: {shape['model']}", f"      direction: {shape['direction']}"]
-        lines += [f"      {name}: {on_one_line(shape[name])}" for name in names]
-    return lines
+def _texts(names: Iterable[str]) -> list[Text]:
+    return list(map(Text, names))
 
 
-def _listed(file: str, frame: FrameSpec, sigma: tuple[float, float, float], first: str, indent: str) -> list[str]:
-    """Lines of a list of ground coordinates: its file, its frame, its standard deviations in the order of the axes."""
-    names = ("east", "north", "up") if "east" in frame.axes else ("x", "y", "z")
-    lines = [
-        f"{first}file: {file}",
-        f"{indent}crs: {on_one_line(frame.crs)}",
-        f"{indent}axes: [{', '.join(frame.axes)}]",
-    ]
+def _listed(file: str, frame: FrameSpec, sigma: tuple[float, float, float]) -> Document:
+    """Return a list of ground coordinates: its file, its frame, its standard deviations in the order of the axes."""
+    names = GROUND_AXES if "east" in frame.axes else CARTESIAN_AXES
+    found: Document = {"file": file, "crs": Text(frame.crs), "axes": list(frame.axes)}
     if frame.height != "ellipsoidal":
-        lines += [f"{indent}height: {frame.height}"]
+        found["height"] = frame.height
     if frame.geoid_undulation is not None:
-        lines += [f"{indent}geoid_undulation: {frame.geoid_undulation!r}"]
+        found["geoid_undulation"] = frame.geoid_undulation
     if frame.ellipsoid is not None:
-        lines += [f"{indent}ellipsoid: {{a: {frame.ellipsoid[0]!r}, b: {frame.ellipsoid[1]!r}}}"]
-    return [*lines, f"{indent}sigma: {on_one_line([sigma[names.index(axis)] for axis in frame.axes])}"]
+        found["ellipsoid"] = dict(zip("ab", frame.ellipsoid, strict=True))
+    return found | {"sigma": [sigma[names.index(axis)] for axis in frame.axes]}
 
 
 def summary(simulation: Simulation) -> str:
