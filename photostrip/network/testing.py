@@ -319,7 +319,7 @@ def _seen(adjusted: Adjusted, rows: Numbers, xyz: Floats) -> _Seen:
     return _Seen(off / sigma, by_photo / sigma[..., None], by_point / sigma[..., None])
 
 
-START, ROBUST = "start", "robust"  # in the place of a test
+START = "start"  # in the place of a test
 
 
 @dataclass(frozen=True, eq=False)

@@ -396,11 +396,7 @@ def settings(project: ProjectFile) -> Settings:
         cross_validation=wanted.cross_validation,
         relative=_laid_over(usual.relative, wanted.relative),
         links=_laid_over(usual.links, wanted.links),
-        formation=StripFormationSettings(
-            scale_transfer=wanted.scale_transfer,
-            scale_weights={str(name): weight for name, weight in wanted.scale_weights.items()},
-            intersection=wanted.intersection,
-        ),
+        formation=StripFormationSettings(wanted.scale_transfer, wanted.intersection),
         absolute=replace(
             usual.absolute,
             earth_curvature=wanted.earth_curvature,

@@ -23,10 +23,10 @@ from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.accuracy_report import named_sections, title_of
 from photostrip.visible import visible
 
-FOREMOST = "verdict", "findings"  # sections before the pictures
+FOREMOST = "verdict", "findings", "check"  # sections before the pictures
 Name = tuple[str, str]  # what it is, and its id
 
-MOST_LINKS = 8  # rows, and pictures, to which one finding leads
+MOST_LINKS = 2  # rows, and pictures, to which one finding leads: one line of them
 KINDS = {"point": "point", "photo": "photo", "photos": "photo"}  # heads of first columns
 
 

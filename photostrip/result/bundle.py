@@ -17,7 +17,7 @@ from photostrip.network.problem import BundleProblem, BundleSettings
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
-from photostrip.result.numbers import PER_RADIAN, record, rms
+from photostrip.result.numbers import PER_RADIAN, attributes, record, rms
 from photostrip.result.points import ImageResiduals
 from photostrip.result.table import Table
 from photostrip.statistics import TEST_LEVEL
@@ -77,13 +77,7 @@ def bundle_of(result: Result) -> Document:
         "convergence": Table.of_rows(
             "bundle.convergence",
             (
-                {
-                    "chi_square": step.chi_square,
-                    "length": step.length,
-                    "damping": step.damping,
-                    "shift": step.shift,
-                    "turn_deg": np.degrees(step.turn),
-                }
+                attributes(step, "chi_square length damping shift") | {"turn_deg": np.degrees(step.turn)}
                 for step in solution.steps
             ),
         ),
@@ -99,7 +93,13 @@ def bundle_of(result: Result) -> Document:
             "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in found.groups]),
             "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in found.groups]),
         },
-        "variance_components": Table.of_rows("bundle.variance_components", _components(found)),
+        "variance_components": Table.of_rows(
+            "bundle.variance_components",
+            (
+                {"group": each.name} | attributes(each, "observations redundancy factor sigma estimated")
+                for each in found.components
+            ),
+        ),
         "calibration": Table.of_rows("bundle.calibration", _calibration(found)),
         "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
         "given": Table.joined(
@@ -121,14 +121,8 @@ def bundle_of(result: Result) -> Document:
 
 def _sigma0(found: Bundle) -> Document:
     test = found.sigma0
-    return {
-        "sigma0": test.sigma0,
-        "redundancy": test.redundancy,
-        "lower": test.lower,
-        "upper": test.upper,
-        "level": TEST_LEVEL,
-        "passed": test.passed if np.isfinite(test.lower) else None,
-    }
+    passed = test.passed if np.isfinite(test.lower) else None
+    return attributes(test, "sigma0 redundancy lower upper") | {"level": TEST_LEVEL, "passed": passed}
 
 
 def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, GroupKind]) -> Document:
@@ -144,33 +138,14 @@ def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, Gr
     }
 
 
-def _components(found: Bundle) -> list[Document]:
-    return [
-        {
-            "group": each.name,
-            "observations": each.observations,
-            "redundancy": each.redundancy,
-            "factor": each.factor,
-            "sigma": each.sigma,
-            "estimated": each.estimated,
-        }
-        for each in found.components
-    ]
-
-
 def _calibration(found: Bundle) -> list[Document]:
     """Return the parameters of the self-calibration: the first of the common unknowns."""
     covariance = found.screened.precision.common[: len(found.parameters), : len(found.parameters)]
     sigma = np.sqrt(np.diag(covariance))
     return [
         {
-            "camera": each.camera,
             "parameter": each.name,
-            "unit": each.unit,
-            "value": each.value,
-            "sigma": each.sigma,
-            "p": each.p,
-            "significant": each.significant,
+            **attributes(each, "camera unit value sigma p significant"),
             "sigma_a_priori": each.prior if np.isfinite(each.prior) else None,
             "controlled": each.redundancy,
             "correlations": row,

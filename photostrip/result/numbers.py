@@ -175,6 +175,12 @@ def rounded_as(entry: Quantity, value: Any, unit: str = "") -> Plain:  # noqa: A
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
+def attributes(value: object, names: str) -> Document:
+    """Return attributes of a value by their names; several values of one as a list."""
+    values = {name: getattr(value, name) for name in names.split()}
+    return {name: list(each) if isinstance(each, tuple) else each for name, each in values.items()}
+
+
 def record(path: str, values: Mapping[str, Any]) -> Document:
     """Round the values of a block, each as its key is described; its tables are rounded already."""
     return _record(block_at(path), values)

@@ -26,6 +26,7 @@ from photostrip.result.numbers import (
     MATRIX,
     PER_RADIAN,
     angle_decimals,
+    attributes,
     coordinate_decimals,
     natural_rank,
     order_of,
@@ -440,12 +441,9 @@ def fiducials_of(result: Result) -> Document:
         "transform": list(found.transforms),
         "coefficients": significant(found.photo_from_measured.coefficients, EXACT),
         "sigma0_um": found.sigma0 * MICROMETRES,
-        "redundancy": found.redundancy,
-        "scale_x": found.scale_x,
-        "scale_y": found.scale_y,
+        **attributes(found, "redundancy scale_x scale_y mirrored"),
         "rotation_deg": np.degrees(found.rotation),
         "shear_deg": np.degrees(found.shear),
-        "mirrored": found.mirrored,
         "marks": list(map(len, found.marks)),
     }
     residuals = np.concatenate(found.residuals) * MICROMETRES

@@ -36,7 +36,8 @@ from photostrip.report.pictures.places import Plan, format_of, grouped, numbers,
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
-LONGEST = 0.07  # the longest vector or half axis, in shares of the plan's extent
+# in shares of the plan's extent: the vector or half axis in the middle, and the longest, at which others are cut off
+TYPICAL, LONGEST = 0.02, 0.12
 MOST_ELLIPSES = 90  # more of them are a grey cloud: new points go without
 ROLES = {
     "new": ("new point", "dot", 3.0),
@@ -52,17 +53,23 @@ def plan_picture(plan: Plan) -> Picture:
     everything = np.concatenate([at, plan.photos[np.isfinite(plan.photos).all(axis=1), :2]])
     extent = max(float(np.ptp(everything, axis=0).max()), 1.0) if len(everything) else 1.0
     sizes = np.concatenate([np.linalg.norm(moved, axis=1), plan.ellipse[:, 0]])
-    longest = max(float(np.nanmax(sizes, initial=0.0)), 1e-9)
-    factor = float(f"{LONGEST * extent / longest:.2g}")
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    typical = max(float(np.median(sizes)), 1e-9) if len(sizes) else 1e-9
+    factor, most = float(f"{TYPICAL * extent / typical:.2g}"), LONGEST * extent
+    drawn = factor * moved
+    drawn *= np.minimum(1.0, most / np.maximum(np.linalg.norm(drawn, axis=1, keepdims=True), 1e-9))
+    axes = plan.ellipse * [factor, factor, 1.0]
+    axes[:, :2] *= np.minimum(1.0, most / np.maximum(axes[:, :1], 1e-9))
+    cut = factor * float(np.max(sizes, initial=0.0)) > most
     known = np.isfinite(plan.ellipse).all(axis=1)
     crowded = int(known.sum()) > MOST_ELLIPSES
     layers: list[Layer] = [Line(plan.photos[rows, :2], "photo thin dashed") for rows in plan.strips.values() if rows]
     shown = np.flatnonzero(known & ~(crowded & (plan.role == "new")))
-    layers.append(Areas([at[n] + factor * ellipse(*plan.ellipse[n]) for n in shown], "open ellipse"))
+    layers.append(Areas([at[n] + ellipse(*axes[n]) for n in shown], "open ellipse"))
     for role, (words, shape, size) in ROLES.items():
         rows = np.flatnonzero(plan.role == role)
         hints = [f"{words} {_hint(plan, n)}" for n in rows.tolist()]
-        layers.append(Segments(at[rows], at[rows] + factor * moved[rows], role))
+        layers.append(Segments(at[rows], at[rows] + drawn[rows], role))
         layers.append(Marks(at[rows], role, shape, hints, words, size))
     centres = np.flatnonzero(np.isfinite(plan.photos).all(axis=1))
     hints = [f"photo {plan.photo_ids[n]}" for n in centres]
@@ -76,10 +83,11 @@ def plan_picture(plan: Plan) -> Picture:
     first = sum(plan.ids[n] in named or plan.role[n] != "new" for n in order)
     places = np.concatenate([at[order[:first]], plan.photos[centres, :2], at[order[first:]]])
     layers.append(Names(places, [*names[0][:first], *names[1], *names[0][first:]]))
-    bar = nice(longest / 2)
+    bar = nice(2 * typical)
     caption = (
         f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}. "
-        f"Both are {factor:.0f} times as large as the ground. {_towards(plan)} to the right."
+        f"Both are {factor:.0f} times as large as the ground{', the longest cut off' if cut else ''}. "
+        f"{_towards(plan)} to the right."
     )
     description = (
         f"{counted(len(plan.strips), 'strip')}, {counted(len(plan.ids), 'point')}; "
