@@ -85,12 +85,10 @@ def report(
 def statement(
     result: Saved,
     class_plan: Annotated[
-        float | None,
-        typer.Option("--class-plan", metavar="CM", min=0.1, max=1e6, help="Class in plan that is asked for, cm."),
+        float | None, typer.Option(metavar="CM", min=0.1, max=1e6, help="Class in plan that is asked for, cm.")
     ] = None,
     class_height: Annotated[
-        float | None,
-        typer.Option("--class-height", metavar="CM", min=0.1, max=1e6, help="Class in height that is asked for, cm."),
+        float | None, typer.Option(metavar="CM", min=0.1, max=1e6, help="Class in height that is asked for, cm.")
     ] = None,
     output: Target = None,
     form: Annotated[StatementFormat | None, FORMAT] = None,
@@ -148,10 +146,7 @@ def compare(
         bool, typer.Option("--again", help="Adjust its project again and compare with what comes out.")
     ] = False,
     project: Annotated[
-        Path | None,
-        typer.Option(
-            "--project", metavar="FILE", help="The project for --again; default: found beside it by its hash."
-        ),
+        Path | None, typer.Option(metavar="FILE", help="The project for --again; default: found beside it by its hash.")
     ] = None,
     form: Annotated[CompareFormat, FORMAT] = "text",
     width: Width = None,

@@ -29,6 +29,7 @@ from photostrip.report.pictures.svg import Picture
 
 MOST_STRIPS = 8  # that have panels
 AXES = ("along", "x"), ("across", "y"), ("up", "z")  # of a strip, and of its polynomials
+LEAST_KM = 2.0
 CURVE_STEPS = 48
 
 
@@ -80,12 +81,14 @@ def deformation_pictures(plan: Plan) -> list[Picture]:
 
 def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Document]) -> list[Panel]:
     course = plan.course(strip)
-    at, shift = course.along(plan.points[after]), course.turned(plan.shift[after])
+    ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
+    of_km, unit = _unit(float(np.ptp(ends)))
+    at, shift = of_km * course.along(plan.points[after]), course.turned(plan.shift[after])
     earlier = [row for row in before if row["id"] in plan.row]
-    earlier_at = course.along(plan.points[plan.rows(row["id"] for row in earlier)])
+    earlier_at = of_km * course.along(plan.points[plan.rows(row["id"] for row in earlier)])
     to_plan = Course(np.zeros(2), plan.north[::-1])  # of east, north and up
     missed = course.turned(to_plan.turned(numbers(earlier, "east", "north", "up")))
-    ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
+    ends = of_km * ends
     reach = span(np.concatenate([ends, at, earlier_at]), zero=False, room=0.02)
     block = next((row for row in plan.document.get("polynomials", []) if row["strip"] == strip), None)
     terms = list(plan.document["polynomial_terms"].where(strip=strip)) if block else []
@@ -96,8 +99,9 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
         of_axis = [row for row in terms if row["axis"] == key]
         if block and of_axis and earlier:
             places = np.linspace(min(*ends, *earlier_at), max(*ends, *earlier_at), CURVE_STEPS)
-            start = float(block["reach_from"]) - 1000.0 * float(earlier_at.min())  # X of the first photo
-            curve = np.column_stack([places, -polynomial(of_axis, 1000.0 * places + start)])
+            metres = 1000.0 / of_km
+            start = float(block["reach_from"]) - metres * float(earlier_at.min())  # X of the first photo
+            curve = np.column_stack([places, -polynomial(of_axis, metres * places + start)])
             layers.append(Line(curve, "c2", "polynomial" if taken else "polynomial, not taken"))
         hints = [f"{row['id']} before: {size:+.3f} m" for row, size in zip(earlier, missed[:, number], strict=True)]
         at_before = np.column_stack([earlier_at, missed[:, number]])
@@ -110,9 +114,14 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
                 layers.append(Segments(places * (1.0, 0.0), places, f"{role} thin"))
                 layers.append(Marks(places, role, shape, hints, words, 4.0))
         title = f"strip {strip}, {axis}" if len(plan.document["strips"]) > 1 else axis
-        labels = "km along the strip" if strip else "km from the first photo", "m"
+        labels = f"{unit} along the strip" if strip else f"{unit} from the first photo", "m"
         panels.append(Panel(layers, title, labels, x=reach))
     return panels
+
+
+def _unit(reach: float) -> tuple[float, str]:
+    """Return what a kilometre has of the unit of an axis, and its name; a reach of 2 km and more is told in km."""
+    return (1.0, "km") if reach >= LEAST_KM else (1000.0, "m")
 
 
 def polynomial(terms: Sequence[Document], x: Floats) -> Floats:
@@ -146,9 +155,13 @@ def precision_pictures(document: Document) -> list[Picture]:
     shown, high = worst_strips(sizes), span(list(sizes.values()))
     panels = []
     for strip in shown:
-        km = numbers(by_strip[strip], "distance") / 1000.0
-        layers = [Line(np.hstack([km, numbers(by_strip[strip], key)]), kind, words) for key, words, kind in CURVES]
-        panels.append(Panel(layers, f"strip {strip}" if len(sizes) > 1 else "", ("km along the strip", "m"), y=high))
+        at = numbers(by_strip[strip], "distance") / 1000.0
+        of_km, unit = _unit(float(np.nanmax(at, initial=0.0)))
+        layers = [
+            Line(np.hstack([of_km * at, numbers(by_strip[strip], key)]), kind, words) for key, words, kind in CURVES
+        ]
+        title = f"strip {strip}" if len(sizes) > 1 else ""
+        panels.append(Panel(layers, title, (f"{unit} along the strip", "m"), y=high))
     caption = (
         "Standard deviations along each strip, mean of the points near each photo: they are smallest where the control"
         " stands."
