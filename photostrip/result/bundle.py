@@ -102,16 +102,6 @@ def bundle_of(result: Result) -> Document:
         ),
         "calibration": Table.of_rows("bundle.calibration", _calibration(found)),
         "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
-        "given": Table.joined(
-            "bundle.given",
-            (
-                Table.of(
-                    "bundle.given", _observed(found, group, np.argwhere(known), shift[group.kind], written[group.kind])
-                )
-                for group in found.groups
-                if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
-            ),
-        ),
         "positions": Table.of_rows("bundle.positions", _positions(found)),
         "corrections": Table.of_rows("bundle.corrections", _corrections(found)),
         "taken_up": Table.of_rows("bundle.taken_up", _taken_up(found)),
@@ -159,10 +149,13 @@ def _positions(found: Bundle) -> Iterator[Document]:
     problem, given = found.screened.problem, found.screened.problem.positions
     sigma = np.where(np.isfinite(given.sigma), given.sigma, np.nan)
     moved = np.where(np.isfinite(given.sigma), found.screened.solution.position_residuals, np.nan)
-    for row, (east, north, up) in enumerate(moved):
-        photo = problem.photo_name(int(given.photo[row]))
-        of_axes = {f"sigma_{axis}": value for axis, value in zip(GROUND_AXES, sigma[row], strict=True)}
-        yield {"photo": photo, "d_east": east, "d_north": north, "d_up": up, **of_axes}
+    (redundancy,) = (
+        (each.redundancy for each in found.groups if each.kind == reliability.POSITION) if len(sigma) else ((),)
+    )
+    for row, photo in enumerate(given.photo.tolist()):
+        values = (("d", moved[row]), ("sigma", sigma[row]), ("redundancy", redundancy[row]))
+        of_axes = {f"{key}_{axis}": size for key, of in values for axis, size in zip(GROUND_AXES, of, strict=True)}
+        yield {"photo": problem.photo_name(photo), **of_axes}
 
 
 def _corrections(found: Bundle) -> Iterator[Document]:
