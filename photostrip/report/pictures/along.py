@@ -105,7 +105,7 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
             layers.append(Line(curve, "c2", "polynomial" if taken else "polynomial, not taken"))
         hints = [f"{row['id']} before: {size:+.3f} m" for row, size in zip(earlier, missed[:, number], strict=True)]
         at_before = np.column_stack([earlier_at, missed[:, number]])
-        layers += [Marks(at_before, "soft open", "dot", hints, "control before", 7.0)] if earlier else []
+        layers.append(Marks(at_before, "soft open", "dot", hints, "control before", 7.0))
         for role, (words, shape, _) in ROLES.items():
             own = [n for n, row in enumerate(after) if plan.role[row] == role]
             if own:
@@ -196,12 +196,10 @@ def check_pictures(document: Document) -> list[Picture]:
         layers: list[Layer] = [Areas([band], "area c1")]
         layers.append(Segments(left, right, "failed dashed", words="limit of 95 %"))
         layers.append(Segments(at * (1.0, 0.0), at, "check thin"))
+        hints = np.array([f"check point {name}: {each:+.2f}" for name, each in zip(ids, size, strict=True)])
         outside = np.abs(size) > limit
-        looks = (~outside, "inside", "square", "check"), (outside, "outside", "diamond", "failed open")
-        for chosen, words, shape, kind in looks:
-            own = np.flatnonzero(chosen)
-            hints = [f"check point {ids[n]}: {size[n]:+.2f}" for n in own]
-            layers += [Marks(at[own], kind, shape, hints, words, 4.0)] if len(own) else []
+        looks = (~outside, "check", "square", "inside"), (outside, "failed open", "diamond", "outside")
+        layers += [Marks(at[own], kind, shape, hints[own].tolist(), words, 4.0) for own, kind, shape, words in looks]
         known = [n for n in worst if np.isfinite(size[n])]
         layers.append(Names(at[known], ids[known].tolist()))
         panels.append(Panel(layers, part, ("check points in their order", "z"), x=ends, names=[""] * len(rows)))
@@ -249,9 +247,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
         layers: list[Layer] = [Segments(borders * (1.0, -1.0), borders, "soft thin dashed")]
         if len(rows) <= MOST_POINTS:
             layers.append(Marks(at[own], "new", "dot", [hints[n] for n in own], "point", 3.3))
-        layers += (
-            [Marks(at[out], "failed open", "diamond", [hints[n] for n in out], "left out", 4.0)] if len(out) else []
-        )
+        layers.append(Marks(at[out], "failed open", "diamond", [hints[n] for n in out], "left out", 4.0))
         title = f"zone {zone}, {where}"
         if len(own):
             there, of_pair = np.unique(number[own], return_inverse=True)

@@ -153,7 +153,7 @@ def displacement_picture(document: Document) -> Picture:
             at = start[own][:, pair]
             hints = [f"{steps[n]['point']}: {steps[n]['length']:.4g} m" for n in own]
             layers.append(Segments(at, at + factor * moved[own][:, pair], look))
-            layers += [Marks(at, look, "dot", hints, words)] if own else []
+            layers.append(Marks(at, look, "dot", hints, words))
         layers.append(Names(start[known][:, pair], [steps[n]["point"] for n in known]))
         panels.append(Map(layers, f"{name}: {axes[pair[0]]} to the right, {axes[pair[1]]} upwards"))
     timed = bool(document["times"])

@@ -68,21 +68,17 @@ def plan_picture(plan: Plan) -> Picture:
     layers.append(Areas([at[n] + ellipse(*axes[n]) for n in shown], "open ellipse"))
     for role, (words, shape, size) in ROLES.items():
         rows = np.flatnonzero(plan.role == role)
-        if len(rows):
-            hints = [f"{words} {_hint(plan, n)}" for n in rows.tolist()]
-            layers.append(Segments(at[rows], at[rows] + drawn[rows], role))
-            layers.append(Marks(at[rows], role, shape, hints, words, size))
-    seen = np.isfinite(plan.photos).all(axis=1)
-    if seen.any():
-        hints = [f"photo {name}" for name in plan.photo_ids]
-        layers.append(Marks(plan.photos[:, :2], "photo open", "diamond", hints, "photo", 4.0))
+        hints = [f"{words} {_hint(plan, n)}" for n in rows.tolist()]
+        layers.append(Segments(at[rows], at[rows] + drawn[rows], role))
+        layers.append(Marks(at[rows], role, shape, hints, words, size))
+    centres = np.flatnonzero(np.isfinite(plan.photos).all(axis=1))
+    hints = [f"photo {plan.photo_ids[n]}" for n in centres]
+    layers.append(Marks(plan.photos[centres, :2], "photo open", "diamond", hints, "photo", 4.0))
     named = _named(document)
     ring = [n for n, name in enumerate(plan.ids) if name in named]
-    if ring:
-        hints = [f"point {plan.ids[n]}: {', '.join(named[plan.ids[n]])}" for n in ring]
-        layers.append(Marks(at[ring], "failed open", "dot", hints, "named by a finding or warning", 15.0))
+    hints = [f"point {plan.ids[n]}: {', '.join(named[plan.ids[n]])}" for n in ring]
+    layers.append(Marks(at[ring], "failed open", "dot", hints, "named by a finding or warning", 15.0))
     order = sorted(range(len(plan.ids)), key=lambda n: (plan.ids[n] not in named, plan.role[n] == "new"))
-    centres = np.flatnonzero(seen)
     names = [plan.ids[n] for n in order], [plan.photo_ids[n] for n in centres]
     first = sum(plan.ids[n] in named or plan.role[n] != "new" for n in order)
     places = np.concatenate([at[order[:first]], plan.photos[centres, :2], at[order[first:]]])

@@ -17,10 +17,8 @@ from photostrip.report.page.layout import (
     WIDEST_PAGE,
     cells,
     clamp,
-    cut,
     has_colours,
     lay_out,
-    pad,
     page_width,
     plain_ascii,
     print_report,
@@ -102,19 +100,6 @@ def test_wrapping_keeps_every_word(text: str, width: int) -> None:
 )
 def test_cells_of_letters(text: str, width: int) -> None:
     assert cells(text) == width
-
-
-def test_cutting_leaves_room_for_the_dots() -> None:
-    assert cut("abcdefgh", 8, "…") == "abcdefgh"
-    assert cut("abcdefgh", 5, "…") == "abcd…"
-    assert cut("abcdefgh", 5, "...") == "ab..."
-    assert cut("点点点", 5, "…") == "点点…"
-    assert pad("点", 4, left=True) == "点  "
-    assert pad("1", 3, left=False) == "  1"
-
-
-def test_widths_have_limits() -> None:
-    assert [clamp(width) for width in (0, 60, 100, 999)] == [NARROWEST, 60, 100, WIDEST_PAGE]
 
 
 def lines(table: Table, width: int) -> list[str]:

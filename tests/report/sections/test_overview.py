@@ -133,13 +133,6 @@ def test_notes_of_a_kind_are_said_once() -> None:
     assert "- strip A: so (and the same for strips B, C)" in lines({**saved(), "notes": notes})
 
 
-def test_a_section_is_printed_whole_by_its_name() -> None:
-    document = crowded()
-    (check,) = chosen_sections(document, names=["check"])
-    (table,) = (part for part in check.parts if isinstance(part, Table))
-    assert (check.title, len(table.rows)) == ("Check points", 300)
-
-
 def test_every_section_has_a_name_and_keeps_its_place() -> None:
     document = saved()
     absent = "This result has no section `{}`."
