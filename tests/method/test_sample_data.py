@@ -9,15 +9,17 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
-from photostrip.cli.main import main
-from photostrip.pipeline.results import ROLES
+from photostrip.arrays import Floats
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.results import ROLES, Result, StripResult
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.project.loading import Project, load_project
@@ -27,18 +29,6 @@ from photostrip.result.table import plain_of
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline, kept, simulated
 from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import Result, StripResult
-    from tests.calls import Capture
-
-    Floats = NDArray[np.float64]
 
 DATA = ROOT / "sample_data"
 APOLLO, SXB, SIMULATED = "apollo15-metric-strip", "sxb-strasbourg", "simulated-20"
@@ -121,19 +111,6 @@ def differences(found: Result, *, check: bool) -> Floats:
     return chosen_rows
 
 
-# --------------------------------------------------------------------------------------------------- all samples
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SAMPLES)
-def test_the_command_adjusts_a_sample(name: str, capsys: Capture, tmp_path: Path) -> None:
-    assert main(["run", str(DATA / name / "project.yaml"), "-o", str(tmp_path)]) == 0
-    assert name in capsys.readouterr().out
-    assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["name"] == name
-
-
-# ------------------------------------------------------------------------------------------------------ baselines
-
 # Largest change that goes unnoticed: of the last digits that are written, and far below what they are good for.
 TOLERANCES = {"_um": 0.11, "_ppm": 0.11, "_deg": 2e-6, "value": 0.11}
 ROTATION = re.compile(r"[ar][123][123]")
@@ -194,9 +171,6 @@ def test_a_sample_gives_what_it_gave_before(name: str, monkeypatch: pytest.Monke
     before = json.loads(baseline(name).read_text(encoding="utf-8"))
     found = list(changes(before, plain_of(kept(name))))
     assert found == [], "when the change is meant: make golden, and review the diff"
-
-
-# ------------------------------------------------------------------------------------------- Apollo 15, five photos
 
 
 @cache
@@ -317,9 +291,6 @@ def test_the_polynomial_helps_the_lunar_strip() -> None:
     assert (rms(better) > 0.9 * limit).all()
 
 
-# ---------------------------------------------------------------------------------------- Strasbourg, three photos
-
-
 @cache
 def strasbourg(control: tuple[str, ...] = (), adjustment: str = "similarity") -> Result:
     """Adjust the Strasbourg strip on some of its control points, by default on all."""
@@ -410,8 +381,6 @@ def test_the_written_angles_are_those_of_the_published_convention() -> None:
         omega, phi, kappa = columns([row], "omega_deg phi_deg kappa_deg")[0]
         assert written[row["photo"]] == pytest.approx([omega, phi, kappa], abs=0.05)
 
-
-# ------------------------------------------------------------------------------------------ twenty simulated photos
 
 SIGMA_UM = 5.0
 GROUND_SIGMA = 0.05  # m, 5 micrometres at 1:10 000
