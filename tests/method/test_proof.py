@@ -437,9 +437,3 @@ def test_a_check_point_never_influences_anything(change: str, curvature: str) ->
     if change == "wild":  # and it is looked at all the same
         at_check = result.control_differences[result.inputs.control.check]
         assert np.abs(np.abs(at_check) - [1e5, 3e5, 4e3]).max() < 10.0
-
-
-@pytest.mark.slow
-def test_twice_is_the_same() -> None:
-    _, inputs = noisy_project()
-    assert document_of(triangulate(inputs, Settings())) == document_of(noisy_result())

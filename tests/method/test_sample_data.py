@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from photostrip.cli.main import main
 from photostrip.pipeline.results import ROLES
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
@@ -30,13 +29,11 @@ from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import Result, StripResult
-    from tests.calls import Capture
 
     Floats = NDArray[np.float64]
 
@@ -119,17 +116,6 @@ def differences(found: Result, *, check: bool) -> Floats:
     chosen = (found.inputs.control.check == check) & (found.control_rows >= 0) & found.inputs.control.use.any(axis=1)
     chosen_rows: Floats = found.control_differences[chosen]
     return chosen_rows
-
-
-# --------------------------------------------------------------------------------------------------- all samples
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SAMPLES)
-def test_the_command_adjusts_a_sample(name: str, capsys: Capture, tmp_path: Path) -> None:
-    assert main(["run", str(DATA / name / "project.yaml"), "-o", str(tmp_path)]) == 0
-    assert name in capsys.readouterr().out
-    assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["name"] == name
 
 
 # ------------------------------------------------------------------------------------------------------ baselines
@@ -236,23 +222,6 @@ def lunar_errors(found: Result, *, check: bool) -> Floats:
     return errors
 
 
-def test_the_lunar_tables_are_what_was_published() -> None:
-    observations, control = rows_of(APOLLO, "observations.csv"), rows_of(APOLLO, "control.csv")
-    reference = {row["point"]: row for row in rows_of(APOLLO, "reference.csv")}
-    photos = [row["photo"] for row in observations]
-    assert {photo: photos.count(photo) for photo in sorted(set(photos))} == {
-        "F1": 131,
-        "F2": 205,
-        "F3": 219,
-        "F4": 229,
-        "F5": 166,
-    }
-    assert len(reference) == len({row["point"] for row in observations}) == 395
-    assert all(row[axis] == reference[row["point"]][axis] for row in nonempty(control) for axis in "xyz")
-    assert sum(row["role"] == "control" for row in control) == 20
-    assert [row["point"] for row in control if row["use"] == "off"] == [OUTLIER]
-
-
 def test_lunar_pairs_fit_as_others_found() -> None:
     found = apollo(screening="none", free=False)
     assert parallax_rms(found.strips[0]) == pytest.approx([14.8, 8.2, 6.9, 6.8], abs=0.06)
@@ -330,16 +299,6 @@ def strasbourg(control: tuple[str, ...] = (), adjustment: str = "similarity") ->
 
 def in_order_of_ids() -> list[str]:
     return sorted(project(SXB).inputs.control.ids, key=int)
-
-
-def test_the_strasbourg_tables_are_what_was_published() -> None:
-    observations = rows_of(SXB, "observations.csv")
-    assert len(observations) == 31 + 253 + 335 + 225
-    assert {(row["sx"], row["sy"]) for row in observations} == {("0.0030", "0.0030"), ("0.0060", "0.0060")}
-    assert sum(row["sx"] == "0.0030" for row in observations) == 31
-    control = rows_of(SXB, "control.csv")
-    assert [row["point"] for row in control] == in_order_of_ids()
-    assert [row["role"] for row in control] == ["control", "check"] * 6
 
 
 def test_strasbourg_pairs_fit_as_others_found() -> None:
