@@ -14,6 +14,7 @@ from photostrip.cli.main import COMMANDS
 from tests.loops import nonempty
 from tests.pages import FRESH_CLONE, blocks, faults_of_page, pages, steps
 from tests.reference import TABLES, command_page, for_the_site, python_page
+from tests.renew_notebooks import NOTEBOOKS
 from tests.source_tree import ROOT, modules
 
 if TYPE_CHECKING:
@@ -93,7 +94,8 @@ def test_formulas_stand_alone(page: Path) -> None:
 def test_the_site_has_every_page_in_its_menu() -> None:
     menu = re.findall(r'"([\w/-]+\.md)"', (ROOT / "zensical.toml").read_text(encoding="utf-8"))
     assert len(menu) == len(set(menu))
-    made = [f"reference/{name}.md" for name in ("commands", "keys", "python", "result", "sources")]
+    made = [f"notebooks/{path.stem}.md" for path in NOTEBOOKS]
+    made += [f"reference/{name}.md" for name in ("commands", "keys", "python", "result", "sources")]
     written = [page.relative_to(ROOT / "docs").as_posix() for page in pages() if page.name != "README.md"]
     assert sorted(menu) == sorted([*written, *made])
 

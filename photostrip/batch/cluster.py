@@ -19,7 +19,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from photostrip.batch.evaluation import BROKEN, Answer, Limits, Task, evaluate, failure, pack
+from photostrip.batch.evaluation import BROKEN, Answer, Limits, Task, evaluate, failed, pack
 from photostrip.batch.folder import program
 from photostrip.batch.pool import LocalPool, Work
 from photostrip.errors import Fault, InputError, PhotostripError
@@ -90,8 +90,7 @@ class Cluster:
         try:
             answer, theirs = future.result()
         except distributed.KilledWorker:
-            message = "every machine that computed it was lost"
-            return Answer(task.number, failure(BROKEN, Fault(message, "worker-died", fix="look at their logs")))
+            return failed(task, BROKEN, "every machine that computed it was lost", "worker-died", "look at their logs")
         except (distributed.CancelledError, TimeoutError, OSError) as error:
             raise lost(str(error)) from None
         except ImportError as error:

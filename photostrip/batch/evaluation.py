@@ -96,11 +96,13 @@ def evaluate(task: Task) -> Answer:
     except GeometryError as error:
         return Answer(task.number, failure(WEAK, error))
     except MemoryError:
-        return Answer(task.number, out_of_memory())
+        return out_of_memory(task)
     except Exception as error:  # noqa: BLE001 (a bug that one project meets must not end the others)
-        message = f"internal error (a bug): {type(error).__name__}: {error}"
-        fault = Fault(message, "internal", fix="`photostrip run PROJECT --debug` shows where")
-        return Answer(task.number, failure(BROKEN, fault), trace=traceback.format_exc())
+        message, fix = (
+            f"internal error (a bug): {type(error).__name__}: {error}",
+            "`photostrip run PROJECT --debug` shows where",
+        )
+        return failed(task, BROKEN, message, "internal", fix, traceback.format_exc())
 
 
 def _from_parcel(task: Task, parcel: Parcel) -> Answer:
@@ -200,10 +202,14 @@ def not_run() -> Document:
     return failure(NOT_RUN, InputError(()))
 
 
-def out_of_memory() -> Document:
-    """Return the line of the summary for a project that needs more memory than it may have."""
+def failed(task: Task, status: str, message: str, code: str, fix: str, trace: str = "") -> Answer:
+    """Answer why a project has no result."""
+    return Answer(task.number, failure(status, Fault(message, code, fix=fix)), trace=trace)
+
+
+def out_of_memory(task: Task) -> Answer:
     fix = "give more with --memory, with fewer processes (-j) if need be"
-    return failure(MEMORY, Fault("needs more memory than a worker may have", "memory", fix=fix))
+    return failed(task, MEMORY, "needs more memory than a worker may have", "memory", fix)
 
 
 def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:

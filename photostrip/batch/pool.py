@@ -23,8 +23,7 @@ from typing import Protocol, Self
 
 from pebble import ProcessExpired, ProcessPool
 
-from photostrip.batch.evaluation import BROKEN, MEMORY, TIMEOUT, Answer, Limits, Task, evaluate, failure, out_of_memory
-from photostrip.errors import Fault
+from photostrip.batch.evaluation import BROKEN, MEMORY, TIMEOUT, Answer, Limits, Task, evaluate, failed, out_of_memory
 from photostrip.threads import THREAD_VARIABLES
 
 TICK_SECONDS = 0.1  # seconds between two looks at what else may have happened
@@ -140,16 +139,17 @@ class LocalPool:
             return future.result()
         except TimeoutError:
             message = f"took longer than {self.limits.seconds:g} s"
-            return Answer(task.number, failure(TIMEOUT, Fault(message, "timeout", fix="give it more with --timeout")))
+            return failed(task, TIMEOUT, message, "timeout", "give it more with --timeout")
         except ProcessExpired as death:
             if death.exitcode == NO_MEMORY:
-                return Answer(task.number, out_of_memory())
+                return out_of_memory(task)
             if task.number not in self._died:
                 self._died.add(task.number)
                 return None
             message = f"the process that computed it died, twice in a row: {cause_of(death.exitcode)}"
-            fix = "`photostrip run PROJECT` shows whether it does so alone"
-            return Answer(task.number, failure(BROKEN, Fault(message, "worker-died", fix=fix)))
+            return failed(
+                task, BROKEN, message, "worker-died", "`photostrip run PROJECT` shows whether it does so alone"
+            )
 
 
 def begin(megabytes: float) -> None:

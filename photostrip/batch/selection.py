@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import os
 import sys
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,22 +102,14 @@ def output_names(projects: Sequence[str]) -> list[str]:
     with as many folders above it as tell one from the other (``north/s1``, ``south/s1``).
     """
     parts = [_parts(project) for project in projects]
-    names = [list(each[-1:]) for each in parts]
-    clashing = list(range(len(projects)))
-    depth = 1
-    while clashing:
-        groups = defaultdict(list)
-        for number in clashing:
-            groups["/".join(names[number]).casefold()].append(number)  # some file systems know no case
-        clashing = [number for group in groups.values() if len(group) > 1 for number in group]
-        depth += 1
-        for number in list(clashing):
-            if depth > len(parts[number]):
-                names[number] = [*parts[number], str(number + 1)]
-                clashing.remove(number)
-            else:
-                names[number] = list(parts[number][-depth:])
-    return ["/".join(name) for name in names]
+    names = [["/".join(each[-depth:]) for depth in range(1, len(each) + 1)] for each in parts]
+    deepest = max(map(len, parts), default=0)
+    # some file systems know no case
+    shared = [Counter(each[min(depth, len(each) - 1)].casefold() for each in names) for depth in range(deepest)]
+    return [
+        next((name for name, of in zip(each, shared, strict=False) if of[name.casefold()] == 1), f"{each[-1]}/{number}")
+        for number, each in enumerate(names, 1)
+    ]
 
 
 def _parts(project: str) -> tuple[str, ...]:

@@ -113,15 +113,12 @@ def schema(
         bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
     ] = False,
     plan: Annotated[
-        PlanKind | None, typer.Option("--plan", help="The file of this command of `photostrip plan` instead.")
+        PlanKind | None, typer.Option(help="The file of this command of `photostrip plan` instead.")
     ] = None,
     terrestrial: Annotated[
-        TerrestrialKind | None,
-        typer.Option("--terrestrial", help="The file of this computation of `photostrip terrestrial` instead."),
+        TerrestrialKind | None, typer.Option(help="The file of this computation of `photostrip terrestrial` instead.")
     ] = None,
-    step: Annotated[
-        StepName | None, typer.Option("--step", help="The keys of this step of `photostrip step` instead.")
-    ] = None,
+    step: Annotated[StepName | None, typer.Option(help="The keys of this step of `photostrip step` instead.")] = None,
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
     ] = False,
@@ -140,7 +137,7 @@ def schema(
     """
     from photostrip.formats.files import write_text
     from photostrip.project.editors import keys_page, schema_of
-    from photostrip.result.schema import result_page, result_schema
+    from photostrip.result.description import result_page, result_schema
 
     asked: dict[str, object] = {"tolerances": tolerances, "simulation": simulation, plan or "": plan}
     asked |= {f"terrestrial {terrestrial}": terrestrial, f"step {step}": step}

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from photostrip.batch.evaluation import Answer
     from photostrip.batch.run import Run
     from photostrip.notes import Document
-    from photostrip.report.page.progress import BatchProgress
+    from photostrip.report.page.progress import Progress
 
 EXIT_SIGNAL = 128  # plus its number, as a shell reports it
 
@@ -95,7 +95,7 @@ def batch(
     from photostrip.batch.pool import LocalPool, cores
     from photostrip.batch.run import Run, Stop, on_signals
     from photostrip.batch.selection import choose
-    from photostrip.report.page.progress import batch_progress
+    from photostrip.report.page.progress import progress as shown_progress
 
     limits, overrides, stop, folder = Limits(timeout, memory), tuple(assignments or ()), Stop(), None
     trouble: list[PhotostripError] = []
@@ -105,7 +105,7 @@ def batch(
             chosen = choose(projects)
             if output is not None:
                 folder = stack.enter_context(opened(output, overrides))
-        progress = stack.enter_context(batch_progress(sys.stderr, len(chosen), quiet=quiet))
+        progress = stack.enter_context(shown_progress(sys.stderr, len(chosen), quiet=quiet, patience=0.0))
         work = Run(chosen, overrides, folder, force=force, strict=strict, html=html)
         try:
             with (
@@ -132,9 +132,7 @@ def batch(
     return code
 
 
-def _said(
-    progress: BatchProgress, total: int, *, quiet: bool, verbose: bool
-) -> Callable[[Document, Answer | None], None]:
+def _said(progress: Progress, total: int, *, quiet: bool, verbose: bool) -> Callable[[Document, Answer | None], None]:
     """Return who says on stderr what became of a project: a line for each, or on a terminal for each failure.
 
     Verbose messages say also where internal errors happened.

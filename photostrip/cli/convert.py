@@ -33,22 +33,15 @@ def convert(
         ),
     ] = None,
     output: Folder = None,
-    to: Annotated[
-        str, typer.Option("--to", metavar="NAME", help="Form of FILE, where its ending does not say it.")
-    ] = "",
+    to: Annotated[str, typer.Option(metavar="NAME", help="Form of FILE, where its ending does not say it.")] = "",
     sigma: Annotated[
-        float | None,
-        typer.Option("--sigma", metavar="PX", help="Standard deviation of an image coordinate in pixels; needed."),
+        float | None, typer.Option(metavar="PX", help="Standard deviation of an image coordinate in pixels; needed.")
     ] = None,
     pixel_size: Annotated[
-        float | None,
-        typer.Option(
-            "--pixel-size", metavar="MM", help="Size of a pixel; else micrometres in reports stand for pixels."
-        ),
+        float | None, typer.Option(metavar="MM", help="Size of a pixel; else micrometres in reports stand for pixels.")
     ] = None,
     image_size: Annotated[
-        str | None,
-        typer.Option("--image-size", metavar="W,H", help="Size of the photos in pixels; HISTORIX does not have it."),
+        str | None, typer.Option(metavar="W,H", help="Size of the photos in pixels; HISTORIX does not have it.")
     ] = None,
     control: Annotated[
         Path | None,
@@ -58,17 +51,15 @@ def convert(
             help="Control with its marks: CSV, gcp_list.txt, ground_control_points.json, markers of Metashape, .xml.",
         ),
     ] = None,
-    crs: Annotated[str, typer.Option("--crs", metavar="CRS", help="Frame of the control, as EPSG:32633.")] = "",
+    crs: Annotated[str, typer.Option(metavar="CRS", help="Frame of the control, as EPSG:32633.")] = "",
     control_sigma: Annotated[
-        str | None,
-        typer.Option("--control-sigma", metavar="M", help="Its standard deviation in metres: one, or EAST,NORTH,UP."),
+        str | None, typer.Option(metavar="M", help="Its standard deviation in metres: one, or EAST,NORTH,UP.")
     ] = None,
     mark_sigma: Annotated[
-        float | None, typer.Option("--mark-sigma", metavar="PX", help="That of a mark in pixels; else --sigma.")
+        float | None, typer.Option(metavar="PX", help="That of a mark in pixels; else --sigma.")
     ] = None,
     mark_width: Annotated[
-        float | None,
-        typer.Option("--mark-width", metavar="PX", help="Width of the photos that were marked, where it is another."),
+        float | None, typer.Option(metavar="PX", help="Width of the photos that were marked, where it is another.")
     ] = None,
     positions: Annotated[
         Path | None,
@@ -79,10 +70,7 @@ def convert(
         ),
     ] = None,
     positions_sigma: Annotated[
-        str | None,
-        typer.Option(
-            "--positions-sigma", metavar="M", help="Standard deviation of HISTORIX's positions: one, or EAST,NORTH,UP."
-        ),
+        str | None, typer.Option(metavar="M", help="Standard deviation of HISTORIX's positions: one, or EAST,NORTH,UP.")
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Overwrite the files of a project in DIR, or of a model.")

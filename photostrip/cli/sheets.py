@@ -45,7 +45,7 @@ def plan(
     """
     with failures_as(form):
         from photostrip.library.sheets import planned
-        from photostrip.report.pictures.plan_strip import strip_plan_picture
+        from photostrip.report.pictures.commands import strip_plan_picture
 
         check_target(output, depfile, picture=kind == "strip")
         found = planned(kind, file, assignments or [])
@@ -73,7 +73,7 @@ def terrestrial(
     """
     with failures_as(form):
         from photostrip.library.sheets import terrestrial as computed
-        from photostrip.report.pictures.displacements import displacement_picture
+        from photostrip.report.pictures.commands import displacement_picture
 
         moved = kind == "displacement"
         check_target(output, depfile, picture=moved)

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
-from photostrip.errors import Fault, InputError
 from photostrip.formats.files import MEGABYTE, decode, read_bytes, refuse
+from photostrip.formats.tables import parsed_json
 from photostrip.notes import Document
 from photostrip.result.derived import with_derived
 from photostrip.result.description import LEFT_OUT, SCHEMA
@@ -16,6 +16,7 @@ from photostrip.result.reading import read
 from photostrip.result.table import Table, in_frame, stored
 from photostrip.visible import visible_json
 
+RESULT = "a result.json of photostrip"
 LARGEST_RESULT = 1000 * MEGABYTE
 LONGEST_LINE = 160  # characters up to which a block stands on one line
 
@@ -65,18 +66,8 @@ def text_of(file: str) -> str:
 
 def parsed(file: str) -> Any:  # noqa: ANN401 (any JSON)
     """Read a file of JSON, or raise what keeps it from being one."""
-    try:
-        return json.loads(text_of(file))
-    except json.JSONDecodeError as error:
-        message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
-        fix = "a result.json that was not written to its end? run the project again"
-        raise InputError(
-            Fault(message=message, code="result-json", file=file, line=error.lineno, column=error.colno, fix=fix)
-        ) from None
-    except ValueError:  # Python reads 4300 digits
-        refuse(file, "result-json", "holds a number with thousands of digits", expected="a result.json of photostrip")
-    except RecursionError:
-        refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
+    fix = "a result.json that was not written to its end? run the project again"
+    return parsed_json(text_of(file), file, "result-json", expected=RESULT, fix=fix)
 
 
 def read_result(file: str) -> Document:
@@ -95,7 +86,7 @@ def checked(document: Any, file: str, lacking: Collection[str] = ()) -> Document
     lacking: blocks that it may lack.
     """
     if not isinstance(document, dict) or "photostrip_result" not in document:
-        refuse(file, "result-kind", "has no key `photostrip_result`", expected="a result.json of photostrip")
+        refuse(file, "result-kind", "has no key `photostrip_result`", expected=RESULT)
     if document["photostrip_result"] != SCHEMA:
         refuse(
             file,
@@ -107,8 +98,11 @@ def checked(document: Any, file: str, lacking: Collection[str] = ()) -> Document
     try:
         whole = read(document, file, lacking=lacking)
     except RecursionError:
-        refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
-    return in_frame(with_derived(whole))
+        refuse(file, "result-json", "is nested too deeply", expected=RESULT)
+    from photostrip.result.certificate import faults_of_edited  # with scipy
+
+    with faults_of_edited("read", (whole, file)):
+        return in_frame(with_derived(whole))
 
 
 KEY = re.compile(r'^( *)"(\w+)": ')

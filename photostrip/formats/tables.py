@@ -691,18 +691,23 @@ def read_json(file: str) -> Any:  # noqa: ANN401 (any JSON)
 
     Raises InputError for all that is none, for a name that stands twice in a block, and for what is no number.
     """
-    text, _ = decode(file, unpacked(file))
+    return parsed_json(decode(file, unpacked(file))[0], file, "foreign", once=True)
+
+
+def parsed_json(text: str, file: str, code: str, *, expected: str = "", fix: str = "", once: bool = False) -> Any:  # noqa: ANN401
+    """Parse JSON, or raise what keeps a text from being it.
+
+    once: whether a name may stand in a block only once, and numbers are numbers.
+    """
     try:
-        return json.loads(text, object_pairs_hook=_once, parse_constant=_no_constant)
+        return json.loads(
+            text, object_pairs_hook=_once if once else None, parse_constant=_no_constant if once else None
+        )
     except json.JSONDecodeError as error:
         message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
-        fault = Fault(message, code="foreign", file=file, line=error.lineno, column=error.colno)
-        raise InputError(fault) from None
+        raise InputError(Fault(message, code, file, line=error.lineno, column=error.colno, fix=fix)) from None
     except RecursionError:
-        refuse(file, "foreign", "is nested too deeply")
+        refuse(file, code, "is nested too deeply", expected=expected)
     except ValueError as error:  # Python reads 4300 digits
-        refuse(
-            file,
-            "foreign",
-            str(error) if isinstance(error, _NoJsonError) else "holds a number with thousands of digits",
-        )
+        own = isinstance(error, _NoJsonError)
+        refuse(file, code, str(error) if own else "holds a number with thousands of digits", expected=expected)

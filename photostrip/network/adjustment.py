@@ -5,10 +5,6 @@ From a problem to its least-squares solution: Gauss-Newton with step control.
 Source: step control after [Marquardt 1963]; the step that may lead up: derived.
 
 Which observations of a problem take part: taking them out, putting them back, starting again from a solution.
-
-Robust adjustment: rays that do not fit lose their weight before anything is tested.
-
-The weights are those of ``strip.robust``: many gross errors at once, also large ones, hardly pull the photos.
 """
 
 from __future__ import annotations
@@ -18,7 +14,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri
 
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
@@ -27,7 +22,6 @@ from photostrip.network import defects
 from photostrip.network.normal_equations import FactoredEquations, NormalEquations, equations_at, factored, linearise
 from photostrip.network.observations import whitening
 from photostrip.network.problem import BundleProblem, Parameters, PreparedProblem, StartValues, prepare
-from photostrip.strip.robust import falling_weights
 
 
 @dataclass(frozen=True)
@@ -394,25 +388,3 @@ def restarted(problem: BundleProblem, solution: BundleSolution) -> BundleProblem
     return replace(
         problem, start=StartValues(centers=solution.centers, rotations=solution.rotations, points=points, scales=scales)
     )
-
-
-REWEIGHTINGS = 6
-NO_WEIGHT = 1e-3  # weight below which a ray is out
-
-
-def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
-    """Adjust with weights that fall with the residual, and give the factor of the weight of each ray, 0 to 1.
-
-    The scale of the residuals is taken from their median.
-    """
-    weight = np.ones(len(problem.images))
-    sigma = problem.images.sigma
-    normal = float(np.sqrt(chdtri(sigma.shape[1], 0.5)))  # median of the length of standard normal residuals
-    for _ in range(REWEIGHTINGS):
-        spread = sigma / np.sqrt(weight)[:, None]
-        solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
-        problem = restarted(problem, solution)
-        size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
-        unit = max(np.median(size) / normal, 1e-12)
-        weight = falling_weights(size / unit)
-    return solution, weight

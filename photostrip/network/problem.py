@@ -25,7 +25,7 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Distortion
 from photostrip.geodesy.frame_spec import GROUND_AXES
 
-SCREENINGS = ("snooping", "robust", "none")
+SCREENINGS = ("snooping", "none")
 TESTS = ("tau", "baarda")
 
 
@@ -63,9 +63,7 @@ ASKED = tuple(dict.fromkeys(each.asked for each in CALIBRATION.values()))
 
 @dataclass(frozen=True)
 class BundleSettings:
-    # how gross errors are searched for: ``"snooping"`` (one after the other, by the largest test value), ``"robust"``
-    # (re-weighted first, then tested) or ``"none"``
-    screening: str = "snooping"
+    screening: str = "snooping"  # how gross errors are searched for: by the largest test values, or ``"none"``
     # ``"tau"``: residuals are compared with the sigma0 found; ``"baarda"``: with the stated standard deviations
     test: str = "tau"
     # probability that anything is rejected in an adjustment without gross errors; of many rejections the part that is

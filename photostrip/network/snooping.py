@@ -18,7 +18,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.network import adjustment, defects, hypotheses, reliability
+from photostrip.network import defects, hypotheses, reliability
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
 from photostrip.network.defects import is_free
 from photostrip.network.hypotheses import (
@@ -35,8 +35,8 @@ from photostrip.network.hypotheses import (
 from photostrip.network.problem import BundleProblem, BundleSettings, PositionObservations
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, JointCofactors, Limit, cofactors_of
 from photostrip.network.testing import (
-    ROBUST,
     START,
+    WRONG_COLUMNS,
     Adjusted,
     RayDecisions,
     RayLog,
@@ -44,6 +44,7 @@ from photostrip.network.testing import (
     cause_of_all,
     decide_rays,
 )
+from photostrip.points import take_rows
 from photostrip.rejection import Rejection
 from photostrip.strip.control_screening import LARGEST_SHARE
 from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
@@ -147,11 +148,7 @@ def _plainer(hypothesis: Hypothesis) -> list[Hypothesis]:
 
 def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
     """Search until there is nothing more to take out, to take up and to put back."""
-    problem, settings = search.problem, search.settings
-    chosen = supported(problem, begin)
-    if settings.screening == "robust":
-        chosen = search.robust(chosen)
-    done = search.clean(search.with_doubted_control(chosen))
+    done = search.clean(search.with_doubted_control(supported(search.problem, begin)))
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
     while (less := search.put_back(done)) is not None:
@@ -220,20 +217,6 @@ class _Search:
         self.problem = restarted(self.problem, done.solution)
         self.rounds += 1
         return done
-
-    def robust(self, selection: Selection) -> Selection:
-        """Take out at once what re-weighting leaves next to no weight."""
-        chosen = selected(self.problem, selection)
-        solution, weight = adjustment.adjust_robustly(chosen)
-        self.problem = restarted(self.problem, solution)
-        self.rounds += adjustment.REWEIGHTINGS
-        rows = np.flatnonzero(selection.images)[weight < adjustment.NO_WEIGHT]
-        rows = rows[~self.spared[self.problem.images.point[rows]]]
-        images = selection.images.copy()
-        images[rows] = False
-        self.out |= {(IMAGE, row, 0): None for row in rows.tolist()}
-        self.rays.test[rows] = ROBUST
-        return supported(self.problem, replace(selection, images=images))
 
     def clean(self, selection: Selection) -> ScreenedBundle:
         """Test, and take up or take out what explains most, until nothing is beyond the limit."""
@@ -504,7 +487,7 @@ class _Search:
             self.spared[points] = True
             return done
         for half in (first, ~first):
-            done = self._without_rays(done, worst.take(np.flatnonzero(half)))
+            done = self._without_rays(done, take_rows(worst, half, ("row", *WRONG_COLUMNS)))
         return done
 
     def _without_given(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:

@@ -168,16 +168,15 @@ def form_screened(
     *,
     readmit: bool,
     first: FirstPhoto = NOTHING_GIVEN,
-    point_weight: Floats | None = None,
 ) -> ScreenedFormation:
     """Form a strip, leave out what its rays contradict, take back what they confirm, and form it again.
 
     Where pairs and junctions had nothing to reject, nothing is looked for.
 
     readmit: whether points that a pair rejected may be taken back.
-    first, point_weight: as in ``form_from_pairs``.
+    first: as in ``form_from_pairs``.
     """
-    formed = form_from_pairs(of_pairs, settings, photos, rays.sigma, first=first, point_weight=point_weight)
+    formed = form_from_pairs(of_pairs, settings, photos, rays.sigma, first=first)
     if of_pairs.used.all() and formed.junctions.used.all():
         return ScreenedFormation(of_pairs, formed, ())
 
@@ -188,9 +187,7 @@ def form_screened(
     changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
     try:
-        formed = form_from_pairs(
-            oriented, settings, photos, rays.sigma, aside, searched=True, first=first, point_weight=point_weight
-        )
+        formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside, searched=True, first=first)
     except GeometryError:
         oriented = of_pairs  # nothing would join two models: what joined them before stays
     formed = without_rows(formed, oriented, aside)
@@ -363,12 +360,8 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     refuse_unusable(oriented, screened.converged, strip.photos)
     wrong: tuple[Rejection, ...] = ()
     tested = True
-    given = settings.formation.scale_weights
-    point_weight = np.array([given.get(name, 1.0) for name in observations.point_ids]) if given else None
     if settings.relative.screening == "none":
-        formed = form_from_pairs(
-            oriented, settings.formation, strip.photos, scatter, first=strip.first, point_weight=point_weight
-        )
+        formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter, first=strip.first)
     else:  # the strip decides what its pairs could not
         rays = StripRays(
             observations=observations,
@@ -386,7 +379,6 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             settings.formation,
             readmit=readmit,
             first=strip.first,
-            point_weight=point_weight,
         )
         rejections = with_readmitted(screened.rejections, oriented.used)
         # as a fresh value: the rays of the old one, 48 bytes for each of its rows, are not needed again

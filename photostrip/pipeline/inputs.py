@@ -265,24 +265,6 @@ def rows_of_models(entries: Sequence[str], measured: ModelPoints) -> Flags:
     return np.array([f"{model}/{name}" in wanted for model, name in zip(models, names, strict=True)], bool)
 
 
-def require_weighted(settings: StripFormationSettings, observations: PhotoPoints) -> None:
-    """Refuse weights of points that no photo shows, with a fault for each."""
-    known = set(observations.point_ids)
-    faults = [
-        Fault(
-            f"`{name}` is no point of the photos",
-            code="no-such-measurement",
-            key="processing.scale_weights",
-            points=(name,),
-            expected="points of the table of observations",
-        )
-        for name in settings.scale_weights
-        if name not in known
-    ]
-    if faults:
-        raise InputError(faults)
-
-
 def _require_known(settings: RelativeSettings | LinkSettings, known: set[str], block: str, expected: str) -> None:
     faults = [
         Fault(

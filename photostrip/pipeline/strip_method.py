@@ -34,7 +34,6 @@ from photostrip.pipeline.inputs import (
     overruling_notes,
     require_measured,
     require_named,
-    require_weighted,
 )
 from photostrip.pipeline.results import PlacedModels, StripResult
 from photostrip.plausibility.given_points import find_shared
@@ -481,7 +480,6 @@ def form_strips(
 def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[FormedPhotos]:
     """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
     require_measured(settings.relative, observations)
-    require_weighted(settings.formation, observations)
     whole = [strip for strip in inputs.strips if len(strip.photos) > 1]
     if len(whole) < len(inputs.strips) and not settings.together:
         alone = next(strip.photos for strip in inputs.strips if len(strip.photos) == 1)

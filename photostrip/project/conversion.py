@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from dataclasses import is_dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from photostrip import camera
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.measured import QUATERNION, ROTATIONS, ControlTable, Measurements
+from photostrip.formats.measured import (
+    QUATERNION,
+    ROTATIONS,
+    ControlTable,
+    Measurements,
+    OrientationTable,
+    PositionTable,
+)
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84, GroundFrame
 from photostrip.geodesy.local_frame import mean_radius, radius_in_azimuth
@@ -37,22 +44,14 @@ from photostrip.project.keys import (
     Orientations,
     Output,
     PixelCamera,
+    Processing,
     ProjectFile,
 )
 from photostrip.project.keys import CameraPositions as PositionsBlock
 from photostrip.project.reading import Node
-from photostrip.project.sections import Section
 from photostrip.strip import fiducial_marks, formed_strip
 from photostrip.strip.fiducial_marks import Certificate
-from photostrip.strip.formed_strip import StripFormationSettings
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-    from photostrip.formats.measured import OrientationTable, PositionTable
-    from photostrip.project.keys import Processing, ProjectFile
-
-T = TypeVar("T", bound="DataclassInstance")
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
 _NUMBERED = re.compile(r"([^0-9]*)([0-9]*)")
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
@@ -114,15 +113,10 @@ def with_k0(given: camera.Camera, k0: float) -> camera.Camera:
 
 
 def distortion_of(given: Distortion) -> camera.Distortion:
-    return camera.Distortion(
-        model=given.model,
-        direction=given.direction,
-        k=given.k,
-        p=given.p,
-        b=given.b,
-        radius=tuple(given.radius),
-        distortion=tuple(given.distortion),
-    )
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in given if name != "k0"
+    }
+    return camera.Distortion(**values)
 
 
 def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
@@ -235,14 +229,14 @@ def _renumbered(ids: Sequence[str], codes: Numbers) -> tuple[tuple[str, ...], Nu
 
 
 def frame_spec(given: GivenList) -> FrameSpec:
-    return FrameSpec(
-        crs=str(given.crs),
-        axes=given.axes or CARTESIAN_AXES,
-        height=given.height,
-        geoid_undulation=given.geoid_undulation,
-        epoch=given.epoch,
-        ellipsoid=semi_axes(given.ellipsoid),
-    )
+    return FrameSpec(**{"axes": CARTESIAN_AXES, **_frame(given)})
+
+
+def _frame(given: GivenList | Output) -> dict[str, Any]:
+    """Return what is said of a frame."""
+    keys = ("crs", "axes", "height", "geoid_undulation", "epoch")
+    said = {name: value for name in keys if (value := getattr(given, name)) is not None}
+    return said if given.ellipsoid is None else said | {"ellipsoid": semi_axes(given.ellipsoid)}
 
 
 def semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
@@ -262,25 +256,14 @@ def first_frame(project: ProjectFile) -> FrameSpec:
 
 def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
     """Return the frame of the results, `first` standing in for what is not given; None when nothing is given."""
-    said = (output.crs, output.axes, output.height, output.geoid_undulation, output.epoch, output.ellipsoid)
-    if all(each is None for each in said):
+    said = _frame(output)
+    if not said:
         return None
-    if output.crs is None:
-        spec = replace(first, axes=output.axes or first.axes)
-        if output.height is not None:
-            spec = replace(spec, height=output.height, geoid_undulation=None)
-        if output.geoid_undulation is not None:
-            spec = replace(spec, geoid_undulation=output.geoid_undulation)
-        spec = replace(spec, epoch=output.epoch or first.epoch)
-        return spec if output.ellipsoid is None else replace(spec, ellipsoid=semi_axes(output.ellipsoid))
-    return FrameSpec(
-        crs=str(output.crs),
-        axes=output.axes or (CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES),
-        height=output.height or "ellipsoidal",
-        geoid_undulation=output.geoid_undulation,
-        epoch=output.epoch,
-        ellipsoid=semi_axes(output.ellipsoid),
-    )
+    if output.crs is not None:
+        return FrameSpec(**{"axes": CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES, **said})
+    if output.height is not None:
+        said = {"geoid_undulation": None, **said}
+    return replace(first, **said)
 
 
 def control_points(tables: Sequence[ControlTable], lists: Sequence[Control]) -> ControlPoints:
@@ -387,52 +370,36 @@ def _earth_radius(wanted: Processing) -> float:
 
 
 def settings(project: ProjectFile) -> Settings:
-    """Return the settings of every operation; what the project does not give keeps the default that stands there."""
-    wanted, usual = project.processing, Settings()
-    radius = _earth_radius(wanted)
-    return Settings(
+    """Return the settings of every operation; what the project does not give keeps the default that stands there.
+
+    Those of an operation are the keys of the block with its name, or of the same names in `processing` itself.
+    """
+    wanted, usual, radius = project.processing, Settings(), _earth_radius(project.processing)
+    keys = {**dict(wanted), "earth_radius": radius}
+    parts = {name: part for name, part in vars(usual).items() if is_dataclass(part)}
+    laid = {name: _laid_over(part, dict(keys[name]) if name in keys else keys) for name, part in parts.items()}
+    laid["bundle"] = replace(laid["bundle"], search_cameras=wanted.self_calibration == AUTO)
+    laid["refinement"] = replace(laid["refinement"], earth_radius=radius if wanted.earth_curvature == "image" else None)
+    return replace(
+        usual,
         adjustment=wanted.adjustment,
         precision=wanted.precision,
         cross_validation=wanted.cross_validation,
-        relative=_laid_over(usual.relative, wanted.relative),
-        links=_laid_over(usual.links, wanted.links),
-        formation=StripFormationSettings(
-            scale_transfer=wanted.scale_transfer,
-            scale_weights={str(name): weight for name, weight in wanted.scale_weights.items()},
-            intersection=wanted.intersection,
-        ),
-        absolute=replace(
-            usual.absolute,
-            earth_curvature=wanted.earth_curvature,
-            earth_radius=radius,
-            control_weights=wanted.control_weights,
-        ),
-        polynomial=_laid_over(usual.polynomial, wanted.polynomial),
-        bundle=replace(_laid_over(usual.bundle, wanted.bundle), search_cameras=wanted.self_calibration == AUTO),
-        interior=_laid_over(usual.interior, wanted.interior),
-        refinement=replace(
-            usual.refinement,
-            principal_point=wanted.principal_point,
-            distortion=wanted.distortion,
-            refraction=wanted.refraction,
-            flying_height=wanted.flying_height,
-            ground_height=wanted.ground_height,
-            earth_radius=radius if wanted.earth_curvature == "image" else None,
-        ),
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,
         tolerances={name: limit for name, limit in project.tolerances if limit is not None},
         accept=tuple(map(str, project.accept)),
+        **laid,
     )
 
 
-def _laid_over(usual: T, given: Section) -> T:
-    """Replace the fields of settings by the keys of a section that has the same names."""
-    changed = dict(given)
+def _laid_over(usual: Any, given: Mapping[str, Any]) -> Any:  # noqa: ANN401 (settings of any operation)
+    """Replace the fields of settings by the keys of the same names."""
+    changed = {name: value for name, value in given.items() if hasattr(usual, name)}
     for name, value in changed.items():
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))
-    return replace(cast("Any", usual), **changed)
+    return replace(usual, **changed)
 
 
 class Attitudes(NamedTuple):

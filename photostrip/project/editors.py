@@ -6,53 +6,34 @@ import json
 import re
 from collections.abc import Iterator
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, get_origin
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic.json_schema import GenerateJsonSchema
 
+from photostrip.planning import PlanKind
 from photostrip.project.sections import AUTO, Section, bare, is_section
+from photostrip.strip import StepName
+from photostrip.terrestrial import TerrestrialKind
 
 if TYPE_CHECKING:
     from pydantic_core import core_schema
+
+
+def _class(kind: str, last: str) -> str:
+    """Return the name of the class that holds the keys of a kind of file: ``OneStationFile`` of ``one-station``."""
+    return kind.title().replace("-", "") + last
+
 
 KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("keys", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
     "tolerances": ("tolerances", "ToleranceFile", "photostrip tolerance profile"),
-    "model": ("plans", "ModelPlanFile", "photostrip plan model"),
-    "strip": ("plans", "StripPlanFile", "photostrip plan strip"),
-    "camera": ("plans", "CameraPlanFile", "photostrip plan camera"),
-    "displacement": ("plans", "DisplacementPlanFile", "photostrip plan displacement"),
-    "screening": ("plans", "ScreeningPlanFile", "photostrip plan screening"),
-    "terrestrial displacement": ("terrestrial", "TerrestrialFile", "photostrip terrestrial displacement"),
+    **{kind: ("plans", _class(kind, "PlanFile"), f"photostrip plan {kind}") for kind in get_args(PlanKind)},
     **{
-        f"terrestrial {kind}": ("terrestrial", name, f"photostrip terrestrial {kind}")
-        for kind, name in {
-            "directions": "DirectionsFile",
-            "photo": "PhotoFile",
-            "accuracy": "AccuracyFile",
-            "theodolite": "TheodoliteFile",
-            "orientation": "OrientationFile",
-            "one-station": "OneStationFile",
-            "cameras": "CamerasFile",
-        }.items()
+        f"terrestrial {kind}": ("terrestrial", _class(kind, "File"), f"photostrip terrestrial {kind}")
+        for kind in get_args(TerrestrialKind)
     },
-    **{
-        f"step {name}": ("plans", f"{kind}Keys", f"photostrip step {name}")
-        for name, kind in {
-            "interior": "Interior",
-            "refine": "Refine",
-            "relative": "Relative",
-            "intersection": "Intersection",
-            "chain": "Step",
-            "scale": "Step",
-            "strip": "Strip",
-            "absolute": "Absolute",
-            "polynomial": "Polynomial",
-            "resection": "Resection",
-            "bundle": "Bundle",
-        }.items()
-    },
+    **{f"step {kind}": ("plans", _class(kind, "Keys"), f"photostrip step {kind}") for kind in get_args(StepName)},
 }
 MEASURED = {  # in a project
     "allOf": [
@@ -113,13 +94,10 @@ class _ForEditors(GenerateJsonSchema):
         return {**found, "default": {} if isinstance(default, Section) else default}
 
 
-def single_keys(kind: type[Section] | None = None, above: str = "") -> Iterator[str]:
+def single_keys() -> Iterator[str]:
     """Return the paths of all single values of a project file; below lists and names of users there are none."""
     from photostrip.project.keys import ProjectFile
 
-    for name, field in (kind or ProjectFile).model_fields.items():
-        inner = bare(field.annotation)
-        if is_section(inner):
-            yield from single_keys(inner, f"{above}{name}.")
-        elif get_origin(inner) not in {list, dict, tuple}:
-            yield f"{above}{name}"
+    for above, name, annotation in ProjectFile.described():
+        if not is_section(bare(annotation)) and get_origin(bare(annotation)) not in {list, dict, tuple}:
+            yield f"{above}.{name}".removeprefix(".")

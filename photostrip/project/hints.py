@@ -93,8 +93,9 @@ def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
         if isinstance(camera, Camera) and (solved := certificate_of(camera)) is not None:
             yield _solved_marks(name, camera, solved, root)
     for measured in (tables.observations, tables.fiducials):
-        if measured is not None:
-            yield from _photos_in_no_strip(measured, photos)
+        if measured is not None and not photos.issuperset(measured.photo_ids):
+            owners = np.array(measured.photo_ids, object)[measured.photo].tolist()
+            yield from _in_no_strip(measured.table, owners, photos)
     if tables.models is not None:
         yield from _of_models(tables.models, tables.control, project)
         return
@@ -106,8 +107,7 @@ def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     bundle = project.processing.adjustment in {AUTO, BUNDLE}
     yield from _measured_once(observations, count, given, together=bundle)
     for read in control:
-        yield from _switched_off(read)
-        yield from _never_measured(read, count, given)
+        yield from _control_not_used(read, count, given)
     for name, given_cameras in (("camera_positions", tables.positions), ("orientations", tables.orientations)):
         if given_cameras is not None:
             yield from _cameras_not_used(project, name, given_cameras, photos)
@@ -137,8 +137,7 @@ def _of_models(models: ModelTables, control: Sequence[ControlTable | None], proj
     given = {table.ids[row] for table in control if table is not None for row in np.flatnonzero(table.used).tolist()}
     for table in control:
         if table is not None:
-            yield from _switched_off(table)
-            yield from _never_measured(table, count, given, "in any model")
+            yield from _control_not_used(table, count, given, "in any model")
 
 
 def _models_used(models: ModelTables, project: ProjectFile, photos: Sequence[str]) -> set[str]:
@@ -165,11 +164,8 @@ def _cameras_not_used(
             f"the {what} are not used: the strip method has no place for them; `processing.adjustment: bundle` has"
         )
         yield Note("cameras-not-used", message, file=read.table.file, key=name)
-        return
-    others = [name for name in read.ids if name not in photos]
-    if others:
-        note = _in_no_strip(read.table, [read.ids.index(name) for name in others], others, photos)
-        yield replace(note, severity="note")
+    else:
+        yield from (replace(note, severity="note") for note in _in_no_strip(read.table, read.ids, photos))
 
 
 def _linear_distortion(project: ProjectFile, root: Node) -> Iterator[Note]:
@@ -241,19 +237,15 @@ def _solved_marks(name: str, camera: Camera, solved: Certificate, root: Node) ->
     return root.place_of(path).note("certificate", message, severity, key=key_path(path))
 
 
-def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
-    others = [name for name in read.photo_ids if name not in photos]
-    if not others:
-        return
-    rows = np.flatnonzero(np.isin(read.photo, locate(others, read.photo_ids)))
-    yield _in_no_strip(read.table, rows.tolist(), others, photos)
-
-
-def _in_no_strip(table: Table, rows: list[int], others: list[str], photos: set[str]) -> Note:
-    verb = "is" if len(rows) == 1 else "are"
-    message = f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip {verb} not used"
-    message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
-    return replace(table.note(rows[0], "photo-in-no-strip", message, key="photo"), photos=tuple(others))
+def _in_no_strip(table: Table, owners: Sequence[str], photos: set[str]) -> Iterator[Note]:
+    """Name the photos of rows that stand in no strip; `owners`: the photo of each row."""
+    rows = [row for row, name in enumerate(owners) if name not in photos]
+    if rows:
+        others = tuple(dict.fromkeys(owners[row] for row in rows))
+        verb = "is" if len(rows) == 1 else "are"
+        message = f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip {verb} not used"
+        message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
+        yield replace(table.note(rows[0], "photo-in-no-strip", message, key="photo"), photos=others)
 
 
 def _measured_once(
@@ -280,29 +272,22 @@ def _first_row(read: Measurements, points: Sequence[str]) -> int:
     return int(np.flatnonzero(np.isin(read.target, locate(points, read.target_ids)))[0])
 
 
-def _switched_off(read: ControlTable) -> Iterator[Note]:
-    """Name control and check points of which nothing counts."""
-    off = [name for name, used in zip(read.ids, read.used, strict=True) if not used]
-    if off:
-        number = counted(len(off), "point is", "points are")
-        message = f"{number} switched off (use: off): {listed(off)}"
-        row = int(np.flatnonzero(~read.used)[0])
-        yield read.table.note(row, "control-off", message, "note", key="use", points=off)
-
-
-def _never_measured(
+def _control_not_used(
     read: ControlTable, count: dict[str, int], given: set[str], where: str = "on any photo"
 ) -> Iterator[Note]:
-    """Name control and check points that no photo shows, and measured points that may be them."""
-    missing = [name for name, used in zip(read.ids, read.used, strict=True) if used and name not in count]
-    if not missing:
-        return
-    near = alike(missing, [name for name in count if name not in given])
-    verb = "is" if len(missing) == 1 else "are"
-    number = counted(len(missing), "control or check point")
-    message = f"{number} {verb} not measured {where}: {listed(missing)}{_twins(near)}"
-    row, level = read.ids.index(missing[0]), "warning" if near else "note"
-    yield read.table.note(row, "control-not-measured", message, level, key="point", points=missing)
+    """Name given points of which nothing counts, then those that nothing shows and measured points that may be them."""
+    used = read.used.tolist()
+    off = [name for name, use in zip(read.ids, used, strict=True) if not use]
+    if off:
+        message = f"{counted(len(off), 'point is', 'points are')} switched off (use: off): {listed(off)}"
+        yield read.table.note(used.index(False), "control-off", message, "note", key="use", points=off)
+    missing = [name for name, use in zip(read.ids, used, strict=True) if use and name not in count]
+    if missing:
+        near = alike(missing, [name for name in count if name not in given])
+        number = counted(len(missing), "control or check point is", "control or check points are")
+        message = f"{number} not measured {where}: {listed(missing)}{_twins(near)}"
+        row, level = read.ids.index(missing[0]), "warning" if near else "note"
+        yield read.table.note(row, "control-not-measured", message, level, key="point", points=missing)
 
 
 def _twins(near: dict[str, str]) -> str:

@@ -38,7 +38,6 @@ from photostrip.project.sections import (
     Fraction,
     Height,
     Id,
-    NotNegative,
     Number,
     NumberOrAuto,
     OneOrMany,
@@ -619,7 +618,7 @@ class Bundle(Section):
     """Bundle adjustment of all strips together."""
 
     screening: Annotated[str, choice(*SCREENINGS)] = key(
-        "How gross errors are searched for: `snooping` (one after the other), `robust` (re-weighted first) or `none`",
+        "How gross errors are searched for: `snooping`, by the largest test values, or `none`",
         USUAL.bundle.screening,
     )
     test: Annotated[str, choice(*TESTS)] = key(
@@ -680,11 +679,6 @@ class Processing(Section):
     scale_transfer: Annotated[str, choice(*SCALE_TRANSFERS)] = key(
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
         USUAL.formation.scale_transfer,
-    )
-    scale_weights: Annotated[dict[str, NotNegative], Before(if_empty)] = key(
-        "Weights of points in the scale transfer, by name, 1 for all others; with 0 a point joins models only where no"
-        " other does",
-        {},
     )
     intersection: Annotated[str, choice(*INTERSECTIONS)] = key(
         "`mean`: Y of a model point is the mean of both rays; `left`: the point lies on the left ray, as printed",

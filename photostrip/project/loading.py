@@ -207,7 +207,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
 
 def read_project(path: Path, overrides: Sequence[str] = ()) -> tuple[Project, Tables]:
     """Read a project as ``load_project`` does, and give its tables, too."""
-    reading = Reading.of(str(path), overrides)
+    reading = Reading.of(ProjectFile, path, overrides)
     root, findings = reading.root, reading.findings
     checked = reading.checked(ProjectFile)
     findings.add(*check_references(root))

@@ -656,6 +656,14 @@ class TurnedKeys(StepKeys):
     angles: Annotated[str, choice(*STEP_ANGLES)] = key("System of the angles, given and found", STEP_ANGLES[0])
 
 
+class ChainKeys(TurnedKeys):
+    """Elements of pairs handed on along a strip."""
+
+
+class ScaleKeys(StepKeys):
+    """Distances of points in two models."""
+
+
 class FocalKeys(StepKeys):
     """A step with photos of one camera."""
 

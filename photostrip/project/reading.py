@@ -74,16 +74,7 @@ class Place(NamedTuple):
     column: int = 0
 
     def fault(self, message: str, code: str, *, key: str = "", expected: str = "", fix: str = "") -> Fault:
-        return Fault(
-            message=message,
-            code=code,
-            file=self.file,
-            line=self.line,
-            column=self.column,
-            key=key,
-            expected=expected,
-            fix=fix,
-        )
+        return Fault(message, code, *self, key=key, expected=expected, fix=fix)
 
     def note(self, code: str, message: str, severity: str = "note", *, key: str = "") -> Note:
         return Note(code, message, severity, file=self.file, line=self.line, column=self.column, key=key)
@@ -254,9 +245,8 @@ def parse(text: str, file: str, findings: Findings) -> Node | None:
     except UnicodeEncodeError:
         findings.add(Fault("is not valid Unicode text", "encoding", file))
     except RecursionError:
-        findings.add(
-            Place(file, 1, 1).fault(f"values are nested more than {DEEPEST} deep", "yaml", expected="a project")
-        )
+        message = f"values are nested more than {DEEPEST} deep"
+        findings.add(Place(file, 1, 1).fault(message, "yaml", expected="a project"))
     except InputError as error:  # no document that a person would write
         findings.add(*error.faults)
     return None
@@ -266,9 +256,7 @@ class _Tree:
     """Makes a tree of texts of what PyYAML composed; what an alias stands for is copied, and counts each time."""
 
     def __init__(self, file: str, findings: Findings) -> None:
-        self.file, self.findings = file, findings
-        self.sound = True
-        self.values = 0
+        self.file, self.findings, self.values, self.sound = file, findings, 0, True
 
     def whole(self, composed: yaml.Node) -> Node | None:
         """Return the tree, None when it cannot be trusted; raises InputError for what no person would write."""
@@ -288,24 +276,19 @@ class _Tree:
             tag = given.tag.replace("tag:yaml.org,2002:", "!!")
             self.findings.add(place.fault(f"the tag {shown(tag)} cannot be used", "tag", fix="remove it"))
         if isinstance(given, yaml.ScalarNode):
-            return Node(self._text(given, place), place)
+            text = given.value.strip()
+            if text != given.value and given.style in {"'", '"'}:
+                self.findings.notes.append(place.note("stray-blanks", f"blanks around `{shown(given.value)}` removed"))
+            return Node(text, place)
         if len(above) >= DEEPEST:
-            message = f"values are nested more than {DEEPEST} deep"
-            raise InputError(place.fault(message, "yaml", expected="a project"))
+            raise InputError(place.fault(f"values are nested more than {DEEPEST} deep", "yaml", expected="a project"))
+        inside = (*above, given)
         if isinstance(given, yaml.SequenceNode):
-            return Node([self._node(each, (*above, given)) for each in given.value], place)
+            return Node([self._node(each, inside) for each in given.value], place)
         node = Node({}, place)
         for key, value in given.value:
-            self._enter(node, self._node(key, (*above, given)), self._node(value, (*above, given)))
+            self._enter(node, self._node(key, inside), self._node(value, inside))
         return node
-
-    def _text(self, given: yaml.ScalarNode, place: Place) -> str:
-        text: str = given.value
-        stripped = text.strip()
-        if stripped != text and given.style in {"'", '"'}:
-            message = f"blanks around `{shown(text)}` removed"
-            self.findings.notes.append(place.note("stray-blanks", message))
-        return stripped
 
     def _enter(self, parent: Node, key: Node, value: Node) -> None:
         """Put a value under its key; the first of two equal keys counts."""
@@ -330,29 +313,22 @@ class _Tree:
 def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
     """Say where YAML breaks off and what may be the matter."""
     problem = str(getattr(error, "problem", None) or error).splitlines()[0]
-    mark = getattr(error, "problem_mark", None)
-    if (
-        "undefined alias" in problem
-        and mark is not None
-        and (alias := _ALIAS.match(text.splitlines()[mark.line], mark.column))
-    ):
-        message, fix = (
-            f"the alias *{shown(alias[1])} stands for nothing",
-            f"name a value with &{shown(alias[1])} before",
-        )
-        fix += ", or put * between quotation marks"
-        return Fault(message, "alias", file, line=mark.line + 1, column=mark.column + 1, fix=fix)
-    begun = getattr(error, "context_mark", None)
-    lines = text.splitlines() or [""]
+    mark, begun = getattr(error, "problem_mark", None), getattr(error, "context_mark", None)
     if mark is None:
         return Fault(f"cannot be read as YAML: {problem}", "yaml", file)
+    lines = text.splitlines() or [""]
+    if "undefined alias" in problem and (alias := _ALIAS.match(lines[mark.line], mark.column)):
+        name = shown(alias[1])
+        fix = f"name a value with &{name} before, or put * between quotation marks"
+        place = Place(file, mark.line + 1, mark.column + 1)
+        return place.fault(f"the alias *{name} stands for nothing", "alias", fix=fix)
     never_closed = "',' or" in problem or "end of stream" in problem or mark.line >= len(lines)
     if begun is not None and never_closed:
         mark = begun  # where something was opened is a better place than where its end is missed
     line = min(mark.line, len(lines) - 1)
     column = mark.column if line == mark.line else 0
     what, fix = _syntax_explained(problem, lines[line], column)
-    return Fault(message=what, code="yaml", file=file, line=line + 1, column=column + 1, fix=fix)
+    return Place(file, line + 1, column + 1).fault(what, "yaml", fix=fix)
 
 
 def _syntax_explained(problem: str, line: str, column: int) -> tuple[str, str]:
@@ -407,25 +383,20 @@ class Reading:
     files: list[str]  # every file that was read, the file itself first
 
     @classmethod
-    def of(cls, file: str, assignments: Sequence[str] = ()) -> Reading:
-        """Read a file and apply what the command line sets, or raise why it is no YAML."""
+    def of(cls, kind: type[Section], path: Path | None, assignments: Sequence[str] = ()) -> Reading:
+        """Read a file and apply what the command line sets, or make one of that; raises why it is no YAML."""
         findings, files = Findings(), list[str]()
-        root = read_tree(file, findings, files)
+        if path is None:
+            place, number = (
+                Place(COMMAND_LINE),
+                next(name for name in kind.model_fields if name.startswith("photostrip")),
+            )
+            root: Node | None = Node({number: Node("1", place)}, place, {number: place})
+        else:
+            root = read_tree(str(path), findings, files)
         if root is None:
             raise InputError(findings.faults)
-        return cls(file=file, root=root, findings=findings, files=files).with_set(assignments)
-
-    @classmethod
-    def of_keys(cls, kind: type[Section], path: Path | None, assignments: Sequence[str]) -> Reading:
-        """Read a file of which every key can be set, or make one of assignments alone."""
-        if path is not None:
-            return cls.of(str(path), assignments)
-        place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name.startswith("photostrip"))
-        root = Node({number: Node("1", place)}, place, {number: place})
-        return cls(file=COMMAND_LINE, root=root, findings=Findings(), files=[]).with_set(assignments)
-
-    def with_set(self, assignments: Sequence[str]) -> Reading:
-        return replace(self, root=override(self.root, assignments, self.findings))
+        return cls(COMMAND_LINE if path is None else str(path), override(root, assignments, findings), findings, files)
 
     def checked(self, kind: type[S]) -> S | None:
         """Return the file with types and defaults; None when there are faults."""
@@ -483,15 +454,9 @@ class Reading:
             raise InputError(at_own_key(fault, self.root) for fault in named) from None
 
 
-def read_keys(kind: type[S], path: Path | None, assignments: Sequence[str]) -> tuple[S, Reading]:
+def read_keys(kind: type[S], path: Path | None, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
     """Read a file of which every key can be set, or make one of assignments alone, or raise every fault."""
-    reading = Reading.of_keys(kind, path, assignments)
-    return reading.read(kind), reading
-
-
-def read_file(kind: type[S], file: str, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
-    """Read a file of a kind, or raise every fault of every file."""
-    reading = Reading.of(file, assignments)
+    reading = Reading.of(kind, path, assignments)
     return reading.read(kind), reading
 
 
@@ -727,17 +692,7 @@ def _explained(problem: Any, name: str, owner: Any) -> WrongValueError:  # noqa:
 
 def homes(schema: type[Section]) -> dict[str, str]:
     """Return the path above each key that stands below another one: ``processing.relative`` for ``grubbs_alpha``."""
-    found: dict[str, str] = {}
-
-    def walk(section: type[Section], above: str) -> None:
-        for name, described in section.model_fields.items():
-            if above:
-                found.setdefault(name, above)
-            if is_section(inner := bare(described.annotation)):
-                walk(inner, f"{above}.{name}" if above else name)
-
-    walk(schema, "")
-    return found
+    return {name: above for above, name, _ in reversed([*schema.described()]) if above}
 
 
 def form_of(node: Node | None) -> Form:

@@ -69,7 +69,6 @@ def check_references(root: Node) -> Iterator[Fault]:
         _units_of_sigma,
         _curvature,
         _needs_of_the_strip_method,
-        _camera_positions,
     ):
         yield from check(root)
 
@@ -251,7 +250,7 @@ def _units_of_sigma(root: Node) -> Iterator[Fault]:
 
 
 def _curvature(root: Node) -> Iterator[Fault]:
-    """Refuse to count the Earth's curvature twice."""
+    """Refuse to count the Earth's curvature twice: eq. 153 is for coordinates that do not carry it."""
     if root.word("processing", "earth_curvature") not in {"model", "image"}:
         return
     systems = [each.word("crs") for each in root.list_at("control")]
@@ -261,6 +260,12 @@ def _curvature(root: Node) -> Iterator[Fault]:
         fix = "remove earth_curvature, or give plane coordinates of an unknown projection as `crs: local`"
         path = ("processing", "earth_curvature")
         yield fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix)
+    for section in ("camera_positions", "orientations"):  # they must lie in the control's frame
+        crs = root.word(section, "crs")
+        if crs not in {"", "local"}:
+            message = f"Earth curvature would be counted twice: {section} in {shown(crs)} already carry it"
+            fix = "remove earth_curvature, or give the positions in the `local` frame of the control"
+            yield fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix)
 
 
 def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
@@ -284,15 +289,3 @@ def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
     elif control is not None and isinstance(control.value, list) and not control.value:
         expected = "at least 1 control list"
         yield fault_at(root, ("control",), "there is no control list", "length", expected=expected)
-
-
-def _camera_positions(root: Node) -> Iterator[Fault]:
-    """Refuse curvature by eq. 153 for positions that carry it: they must lie in the control's frame."""
-    if root.word("processing", "earth_curvature") not in {"model", "image"}:
-        return
-    for section in ("camera_positions", "orientations"):
-        crs = root.word(section, "crs")
-        if crs not in {"", "local"}:
-            message = f"Earth curvature would be counted twice: {section} in {shown(crs)} already carry it"
-            fix = "remove earth_curvature, or give the positions in the `local` frame of the control"
-            yield fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix)

@@ -24,7 +24,6 @@ OF_PHOTOS = (
     "relative",
     "bundle",
     "scale_transfer",
-    "scale_weights",
     "intersection",
     "principal_point",
     "distortion",

@@ -98,6 +98,14 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
     gone: ClassVar[dict[str, str]] = {}  # keys that were taken once, and what to do instead
 
+    @classmethod
+    def described(cls, above: str = "") -> Iterator[tuple[str, str, Any]]:
+        """Give every key, those of sections below it too: the path above it, its name and its type."""
+        for name, field in cls.model_fields.items():
+            yield above, name, field.annotation
+            if is_section(inner := bare(field.annotation)):
+                yield from inner.described(f"{above}.{name}".removeprefix("."))
+
     def changed(self, **values: Any) -> Self:  # noqa: ANN401 (values of any type)
         return self.model_copy(update=values)
 

@@ -15,7 +15,7 @@ from photostrip import camera, simulation
 from photostrip.formats.faults import shown, suggestion
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.keys import CRS, UNDULATION, Distortion, Ellipsoid, Unit
-from photostrip.project.reading import Reading, read_file
+from photostrip.project.reading import Reading, read_keys
 from photostrip.project.sections import (
     After,
     Axes,
@@ -224,7 +224,7 @@ class Specification:
 
 def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specification:
     """Read the specification of a simulation, or raise every fault of it."""
-    given, reading = read_file(SimulationFile, str(path), overrides)
+    given, reading = read_keys(SimulationFile, path, overrides)
     return Specification(_spec(given), reading)
 
 

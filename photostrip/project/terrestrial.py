@@ -622,7 +622,7 @@ class Processing(Section):
     )
 
 
-class TerrestrialFile(CamerasFile):
+class DisplacementFile(CamerasFile):
     """Displacements from photos of two stations."""
 
     name: Words = key("Name of the survey", "displacements")
@@ -694,8 +694,8 @@ class Survey:
 
 def load_survey(path: Path | None, overrides: Sequence[str] = ()) -> Survey:
     """Read a terrestrial project and its table, or raise every fault of every file."""
-    reading = Reading.of_keys(TerrestrialFile, path, overrides)
-    checked = reading.checked(TerrestrialFile)
+    reading = Reading.of(DisplacementFile, path, overrides)
+    checked = reading.checked(DisplacementFile)
     cameras = _cameras(checked, reading) if checked is not None else []
     series = _series(checked, reading, cameras)
     given = reading.complete(checked)
@@ -713,7 +713,7 @@ def load_survey(path: Path | None, overrides: Sequence[str] = ()) -> Survey:
     )
 
 
-def _cameras(given: TerrestrialFile, reading: Reading) -> list[Phototheodolite]:
+def _cameras(given: DisplacementFile, reading: Reading) -> list[Phototheodolite]:
     """Return the cameras of both stations; fewer when one is at fault."""
     known = known_presets(reading)
     found = {
@@ -727,7 +727,7 @@ def _cameras(given: TerrestrialFile, reading: Reading) -> list[Phototheodolite]:
     return [camera for station in given.both if (camera := found.get(station.camera)) is not None]
 
 
-def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: Reading) -> StereoPair:
+def _pair(given: DisplacementFile, cameras: Sequence[Phototheodolite], reading: Reading) -> StereoPair:
     focal = (cameras[0].principal_distance, cameras[1].principal_distance)
     if given.axes is None:
         normal = normal_pair(focal[0], given.base or 0.0)
@@ -740,7 +740,7 @@ def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: R
     return StereoPair(focal, centers - ahead[:, None] * rotations[:, :, 2], rotations)
 
 
-def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, reading: Reading) -> Floats:
+def _rotation(given: DisplacementFile, side: str, camera: Phototheodolite, reading: Reading) -> Floats:
     """Photo to ground of a station, from its angles or from the directions measured there."""
     station, unit = given.both[SIDES.index(side)], given.measurements.unit
     sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * MILLIMETRES[unit]
@@ -766,7 +766,7 @@ class _Measured(NamedTuple):
     shared: Floats
 
 
-def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[Phototheodolite]) -> Series | None:
+def _series(given: DisplacementFile | None, reading: Reading, cameras: Sequence[Phototheodolite]) -> Series | None:
     """Read the table of measurements, whether or not the rest of the project is right; None when there are faults.
 
     It is brought into mm, reduced to the principal points, z up.
@@ -786,7 +786,7 @@ def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[P
 
 
 def _read_series(
-    file: str, findings: Findings, given: TerrestrialFile | None, measured: Measurements, centre: Floats
+    file: str, findings: Findings, given: DisplacementFile | None, measured: Measurements, centre: Floats
 ) -> Series | None:
     coordinates = measured.coordinates is not None
     read = (terrestrial.read_coordinates if coordinates else terrestrial.read_pseudo_parallaxes)(file, findings)
@@ -803,7 +803,7 @@ def _read_series(
     return Series(read.points, epochs, *built, stable=stable)
 
 
-def _times(given: TerrestrialFile, reading: Reading) -> tuple[float, ...] | None:
+def _times(given: DisplacementFile, reading: Reading) -> tuple[float, ...] | None:
     """Return the times of the epochs, when they have any."""
     times = [each.time for each in given.epochs or ()]
     if not any(time is not None for time in times):

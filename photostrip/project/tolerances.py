@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.faults import LARGEST_NUMBER
-from photostrip.project.reading import read_file
+from photostrip.project.reading import read_keys
 from photostrip.project.sections import (
     Flag,
     NotNegative,
@@ -81,7 +81,7 @@ class ToleranceFile(Section):
 
 def load_tolerances(path: Path) -> tuple[Tolerances, Sequence[str]]:
     """Read a tolerance profile and name the files it was read from, or raise every fault of it."""
-    given, reading = read_file(ToleranceFile, str(path))
+    given, reading = read_keys(ToleranceFile, path)
     kinds = {name: _completed(getattr(USUAL, name), getattr(given, name)) for name in Tolerances.__dataclass_fields__}
     return Tolerances(**kinds), reading.files
 

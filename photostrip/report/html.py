@@ -11,21 +11,22 @@ from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from hashlib import sha256
 from importlib import resources
+from itertools import groupby
 
 from photostrip.notes import Document
-from photostrip.report.commands.batch import batch_page_sections
-from photostrip.report.page.parts import Facts, Part, Section, Table, Words
+from photostrip.report.commands.batch import batch_sections
+from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import BETWEEN
-from photostrip.report.pictures.batch import batch_maps
+from photostrip.report.pictures.commands import batch_maps
 from photostrip.report.pictures.result import SECTIONS, pictures_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.accuracy_report import named_sections, title_of
 from photostrip.visible import visible
 
-FOREMOST = "verdict", "findings"  # sections before the pictures
+FOREMOST = "verdict", "findings", "check"  # sections before the pictures
 Name = tuple[str, str]  # what it is, and its id
 
-MOST_LINKS = 8  # rows, and pictures, to which one finding leads
+MOST_LINKS = 2  # rows, and pictures, to which one finding leads: one line of them
 KINDS = {"point": "point", "photo": "photo", "photos": "photo"}  # heads of first columns
 
 
@@ -37,7 +38,7 @@ def to_html(document: Document) -> str:
 
 def batch_html(outcomes: Sequence[Document], version: str) -> str:
     """Return the summary of a batch as a page that leads to the reports."""
-    verdict, *others = batch_page_sections(outcomes)
+    *others, verdict = batch_sections(outcomes, everything=True)
     named = [("verdict", verdict), *(("", section) for section in others)]
     return _page("Batch", version, _sections(named, batch_maps(outcomes)))
 
@@ -83,16 +84,8 @@ def _sections(named: Iterable[tuple[str, Section]], pictures: Sequence[Picture])
         while identity in used:
             identity = f"{identity}-{number}"
         used.add(identity)
-        found.append(
-            {
-                "name": name,
-                "id": identity,
-                "title": section.title,
-                "parts": list(_parts(section.parts)),
-                "pictures": [],
-                "further": [],
-            }
-        )
+        drawn = {"title": section.title, "parts": list(_parts(section.parts)), "pictures": [], "further": []}
+        found.append({"name": name, "id": identity, **drawn})
     _place(found, pictures)
     link(found)
     return found
@@ -115,38 +108,28 @@ def _place(sections: list[Document], pictures: Sequence[Picture]) -> None:
 
 def _parts(parts: Iterable[Part]) -> Iterator[Document]:
     """Give parts as the template takes them; words with a mark that follow each other are one list."""
-    waiting: list[Words] = []
-    for part in parts:
-        if isinstance(part, Words) and part.mark:
-            waiting.append(part)
+    for marked, group in groupby(parts, lambda part: isinstance(part, Words) and part.mark != ""):
+        if marked:
+            yield _list([part for part in group if isinstance(part, Words)])
             continue
-        yield from _list(waiting)
-        waiting = []
-        if isinstance(part, Words):
-            yield {"kind": "words", "text": part.text, "style": part.style}
-        elif isinstance(part, Facts):
-            yield {"kind": "facts", "rows": part.rows}
-        elif isinstance(part, Table):
-            pages = part.pages or ("",) * len(part.rows)
-            rows = [
-                {"cells": cells, "id": "", "findings": [], "page": page}
-                for cells, page in zip(part.rows, pages, strict=True)
-            ]
-            yield {"kind": "table", "columns": part.columns, "rows": rows, "foot": part.foot, "note": part.note}
-    yield from _list(waiting)
+        for part in group:
+            drawn: Document = {"kind": type(part).__name__.lower(), **vars(part)}
+            if isinstance(part, Table):
+                pages = part.pages or ("",) * len(part.rows)
+                rows = zip(part.rows, pages, strict=True)
+                drawn["rows"] = [{"cells": cells, "id": "", "findings": [], "page": page} for cells, page in rows]
+            yield drawn
 
 
-def _list(words: list[Words]) -> Iterator[Document]:
-    """Give a list; words marked by a blank go on with the item before them."""
+def _list(words: Sequence[Words]) -> Document:
+    """Return a list; words marked by a blank go on with the item before them."""
     items: list[Document] = []
     for each in words:
         if each.mark.strip() or not items:
             items.append({"text": each.text, "more": [], "names": each.names, "id": "", "links": [], "pictures": []})
         else:
             items[-1]["more"].append(each.text)
-    if items:
-        tag = "ol" if words[0].mark.strip()[:1].isdigit() else "ul"
-        yield {"kind": "list", "tag": tag, "items_": items}
+    return {"kind": "list", "tag": "ol" if words[0].mark.strip()[:1].isdigit() else "ul", "items_": items}
 
 
 def link(sections: list[Document]) -> None:

@@ -17,7 +17,7 @@ from photostrip.network.problem import BundleProblem, BundleSettings
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
-from photostrip.result.numbers import PER_RADIAN, record, rms
+from photostrip.result.numbers import PER_RADIAN, attributes, record, rms
 from photostrip.result.points import ImageResiduals
 from photostrip.result.table import Table
 from photostrip.statistics import TEST_LEVEL
@@ -77,13 +77,7 @@ def bundle_of(result: Result) -> Document:
         "convergence": Table.of_rows(
             "bundle.convergence",
             (
-                {
-                    "chi_square": step.chi_square,
-                    "length": step.length,
-                    "damping": step.damping,
-                    "shift": step.shift,
-                    "turn_deg": np.degrees(step.turn),
-                }
+                attributes(step, "chi_square length damping shift") | {"turn_deg": np.degrees(step.turn)}
                 for step in solution.steps
             ),
         ),
@@ -99,19 +93,15 @@ def bundle_of(result: Result) -> Document:
             "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in found.groups]),
             "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in found.groups]),
         },
-        "variance_components": Table.of_rows("bundle.variance_components", _components(found)),
-        "calibration": Table.of_rows("bundle.calibration", _calibration(found)),
-        "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
-        "given": Table.joined(
-            "bundle.given",
+        "variance_components": Table.of_rows(
+            "bundle.variance_components",
             (
-                Table.of(
-                    "bundle.given", _observed(found, group, np.argwhere(known), shift[group.kind], written[group.kind])
-                )
-                for group in found.groups
-                if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
+                {"group": each.name} | attributes(each, "observations redundancy factor sigma estimated")
+                for each in found.components
             ),
         ),
+        "calibration": Table.of_rows("bundle.calibration", _calibration(found)),
+        "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
         "positions": Table.of_rows("bundle.positions", _positions(found)),
         "corrections": Table.of_rows("bundle.corrections", _corrections(found)),
         "taken_up": Table.of_rows("bundle.taken_up", _taken_up(found)),
@@ -121,14 +111,8 @@ def bundle_of(result: Result) -> Document:
 
 def _sigma0(found: Bundle) -> Document:
     test = found.sigma0
-    return {
-        "sigma0": test.sigma0,
-        "redundancy": test.redundancy,
-        "lower": test.lower,
-        "upper": test.upper,
-        "level": TEST_LEVEL,
-        "passed": test.passed if np.isfinite(test.lower) else None,
-    }
+    passed = test.passed if np.isfinite(test.lower) else None
+    return attributes(test, "sigma0 redundancy lower upper") | {"level": TEST_LEVEL, "passed": passed}
 
 
 def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, GroupKind]) -> Document:
@@ -144,33 +128,14 @@ def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, Gr
     }
 
 
-def _components(found: Bundle) -> list[Document]:
-    return [
-        {
-            "group": each.name,
-            "observations": each.observations,
-            "redundancy": each.redundancy,
-            "factor": each.factor,
-            "sigma": each.sigma,
-            "estimated": each.estimated,
-        }
-        for each in found.components
-    ]
-
-
 def _calibration(found: Bundle) -> list[Document]:
     """Return the parameters of the self-calibration: the first of the common unknowns."""
     covariance = found.screened.precision.common[: len(found.parameters), : len(found.parameters)]
     sigma = np.sqrt(np.diag(covariance))
     return [
         {
-            "camera": each.camera,
             "parameter": each.name,
-            "unit": each.unit,
-            "value": each.value,
-            "sigma": each.sigma,
-            "p": each.p,
-            "significant": each.significant,
+            **attributes(each, "camera unit value sigma p significant"),
             "sigma_a_priori": each.prior if np.isfinite(each.prior) else None,
             "controlled": each.redundancy,
             "correlations": row,
@@ -184,10 +149,13 @@ def _positions(found: Bundle) -> Iterator[Document]:
     problem, given = found.screened.problem, found.screened.problem.positions
     sigma = np.where(np.isfinite(given.sigma), given.sigma, np.nan)
     moved = np.where(np.isfinite(given.sigma), found.screened.solution.position_residuals, np.nan)
-    for row, (east, north, up) in enumerate(moved):
-        photo = problem.photo_name(int(given.photo[row]))
-        of_axes = {f"sigma_{axis}": value for axis, value in zip(GROUND_AXES, sigma[row], strict=True)}
-        yield {"photo": photo, "d_east": east, "d_north": north, "d_up": up, **of_axes}
+    (redundancy,) = (
+        (each.redundancy for each in found.groups if each.kind == reliability.POSITION) if len(sigma) else ((),)
+    )
+    for row, photo in enumerate(given.photo.tolist()):
+        values = (("d", moved[row]), ("sigma", sigma[row]), ("redundancy", redundancy[row]))
+        of_axes = {f"{key}_{axis}": size for key, of in values for axis, size in zip(GROUND_AXES, of, strict=True)}
+        yield {"photo": problem.photo_name(photo), **of_axes}
 
 
 def _corrections(found: Bundle) -> Iterator[Document]:

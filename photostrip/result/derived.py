@@ -10,20 +10,21 @@ from photostrip.rejection import UNCONTROLLED
 from photostrip.result.distances import level
 from photostrip.result.table import Table
 
-PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}  # in a covariance matrix
+MIXED = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}  # places in a covariance matrix
 
 
 def with_derived(document: Document) -> Document:
     """Return a document with the columns that are derived; a baseline has no rays."""
     derived = {"points": _with_ellipses(document["points"], document["frame"])}
-    if "residuals" in document and "redundancy_x" in document["residuals"].columns:
-        derived["residuals"] = _with_tests(document["residuals"], document["bundle"]["reliability"])
+    if "residuals" in document and {"redundancy_x", "redundancy_y"} <= {*document["residuals"].columns}:
+        bundle: Document = document.get("bundle") or {}  # somebody may have edited it
+        derived["residuals"] = _with_tests(document["residuals"], bundle.get("reliability", {}))
     return document | derived
 
 
 def _with_tests(rays: Table, reliability: Document) -> Table:
     """Add standardised residuals v / (sigma sqrt(r)) and detectable errors: sigma / sqrt(r) times the noncentrality."""
-    columns, noncentrality = {}, _number(reliability["noncentrality"])
+    columns, noncentrality = {}, _number(reliability.get("noncentrality"))
     for axis in "xy":
         of_axis = f"sigma_{axis}_um"
         sigma = rays[of_axis] if of_axis in rays.columns else _number(reliability.get("image_sigma_um"))
@@ -40,14 +41,13 @@ def _number(value: float | None) -> float:
 
 def _with_ellipses(points: Table, frame: Document) -> Table:
     """Add covariances, and standard error ellipses in plan, to points whose standard deviations are known."""
-    if "correlation_xy" not in points.columns:
+    if not {f"correlation_{pair}" for pair in MIXED} <= {*points.columns}:
         return points
     sigma = np.column_stack([points[f"sigma_{axis}"] for axis in "xyz"])
     covariances, columns = np.empty((len(points), 3, 3)), {}
-    for pair, (k, j) in PLACES.items():
-        size = sigma[:, k] * sigma[:, j]
-        if k != j:
-            size = columns[f"cov_{pair}"] = size * points[f"correlation_{pair}"]
+    covariances[:, range(3), range(3)] = sigma**2
+    for pair, (k, j) in MIXED.items():
+        size = columns[f"cov_{pair}"] = points[f"correlation_{pair}"] * sigma[:, k] * sigma[:, j]
         covariances[:, k, j] = covariances[:, j, k] = size
     axes = level(frame, np.column_stack([points[axis] for axis in "xyz"]))
     (larger, smaller), azimuth = ellipses(axes @ covariances @ axes.transpose(0, 2, 1))

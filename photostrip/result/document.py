@@ -10,12 +10,13 @@ from photostrip.pipeline.results import Result
 from photostrip.result import bundle, given, points, precision, rejected, strips, summary
 from photostrip.result.derived import with_derived
 from photostrip.result.description import SCHEMA
-from photostrip.result.numbers import natural_rank
+from photostrip.result.numbers import attributes, natural_rank
 from photostrip.result.statement import statement_of
 from photostrip.result.table import Table, in_frame
 from photostrip.result.verdict import verdict_of
 
-CONCERNED = ("photos", "points", "file", "line", "column", "key")  # of findings and notes: whom, and the cause
+CONCERNED = "photos points file line column key"  # of findings and notes: whom, and the cause
+OF_NOTES = f"code severity message strip {CONCERNED}"
 
 
 def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
@@ -59,10 +60,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "rejected": taken_out,
         "not_determined": points.not_determined_of(result),
         "findings": Table.of_rows("findings", map(_finding, result.findings)),
-        "notes": Table.of_rows(
-            "notes",
-            (_values(note, "code", "severity", "message", "strip", *CONCERNED) for note in (*said, *lost, *unchecked)),
-        ),
+        "notes": Table.of_rows("notes", (attributes(note, OF_NOTES) for note in (*said, *lost, *unchecked))),
         "models": strips.independent_models_of(result) if result.model_strips else strips.models_of(result),
         **({"links": strips.links_of(result)} if result.model_strips else {}),
         "junctions": strips.junctions_of(result),
@@ -89,10 +87,5 @@ def _finding(finding: Finding) -> Document:
         name: float(f"{value:.6g}") if isinstance(value, float) else value
         for name, value in sorted(finding.evidence.items())
     }
-    of_findings = ("code", "title", "severity", "accepted", "message", "fix")
-    return _values(finding, *of_findings) | {"evidence": evidence} | _values(finding, "strips", *CONCERNED)
-
-
-def _values(noted: Finding | Note, *names: str) -> Document:
-    values = {name: getattr(noted, name) for name in names}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    said = attributes(finding, f"code title severity accepted message fix evidence strips {CONCERNED}")
+    return said | {"evidence": evidence}

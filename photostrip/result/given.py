@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 from math import erfc, sqrt
@@ -12,9 +12,10 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.network.reliability import Group
 from photostrip.notes import Document
 from photostrip.pipeline.given_points import axes_of, rejected_control
-from photostrip.pipeline.results import Precision, Result
+from photostrip.pipeline.results import Bundle, Precision, Result
 from photostrip.points import locate, located
 from photostrip.result.numbers import natural_rank
 from photostrip.result.table import Table
@@ -265,13 +266,29 @@ def _expected(result: Result, held: Flags) -> Floats:
             variance[rows] = np.einsum("nka,nk->na", level**2, variance[rows])
     sigma = np.sqrt(control.sigma**2 + variance)
     if bundle is not None and of_bundle is not None:
-        problem = bundle.screened.problem
-        rows = locate(map(problem.point_name, problem.control.point.tolist()), control.ids)
-        for group in (each for each in bundle.groups if each.kind == CONTROL):
+        for rows, group in _observed(bundle, control.ids):
             share = np.sqrt(np.clip(group.redundancy, LEAST_SHARE**2, 1.0))
             residual = group.sigma * share * bundle.unit
             sigma[rows] = np.where(np.isfinite(residual), residual, sigma[rows])
     return np.asarray(sigma, float)
+
+
+def _observed(bundle: Bundle, ids: Sequence[str]) -> Iterator[tuple[Numbers, Group]]:
+    """Give what a bundle knows of its control, where there is some, and the rows of its points among these ids."""
+    problem = bundle.screened.problem
+    rows = locate(map(problem.point_name, problem.control.point.tolist()), ids)
+    yield from ((rows, each) for each in bundle.groups if each.kind == CONTROL)
+
+
+def _redundancy(result: Result) -> Document:
+    """Return columns of ``control``: how well each coordinate is checked in the bundle adjustment."""
+    control = result.inputs.control
+    if result.bundle is None:
+        return {}
+    redundancy = np.full(control.sigma.shape, np.nan)
+    for rows, group in _observed(result.bundle, control.ids):
+        redundancy[rows] = group.redundancy
+    return {f"redundancy_{k}": column for k, column in enumerate(_in_list_order(result, redundancy).T, 1)}
 
 
 def control_of(result: Result, found: Differences) -> Table:
@@ -287,6 +304,7 @@ def control_of(result: Result, found: Differences) -> Table:
         **size_columns(found.axes[order], found.plan[order], found.height[order], found.scale[order]),
         **{f"sigma_{k + 1}": column for k, column in enumerate(_in_list_order(result, control.sigma)[order].T)},
         **{f"sigma_fit_{k + 1}": column for k, column in enumerate(_in_list_order(result, found.sigma)[order].T)},
+        **{key: column[order] for key, column in _redundancy(result).items()},
         "normalised": found.normalised[order],
         "stands_out": _chosen(PARTS, found.stands_out[order]),
         "list": control.frame[order] + 1,

@@ -134,6 +134,12 @@ def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
+def mean(values: Floats) -> float:
+    """Mean of what is not NaN; NaN when there is nothing."""
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
 MATRIX = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))  # of a rotation, by rows
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
@@ -173,6 +179,12 @@ def rounded_as(entry: Quantity, value: Any, unit: str = "") -> Plain:  # noqa: A
     if entry.digits is not None:
         return significant(value, entry.digits)
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def attributes(value: object, names: str) -> Document:
+    """Return attributes of a value by their names; several values of one as a list."""
+    values = {name: getattr(value, name) for name in names.split()}
+    return {name: list(each) if isinstance(each, tuple) else each for name, each in values.items()}
 
 
 def record(path: str, values: Mapping[str, Any]) -> Document:

@@ -13,9 +13,9 @@ from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.points import take_rows
-from photostrip.result.derived import PLACES
+from photostrip.result.derived import MIXED
 from photostrip.result.given import PARTS, Differences, chances, differences, size_columns, stand_out, turned
-from photostrip.result.numbers import PER_RADIAN, natural, record, rms
+from photostrip.result.numbers import PER_RADIAN, attributes, natural, record, rms
 from photostrip.result.table import Table
 from photostrip.statistics import chi2_quantile, normal_quantile, squares_p_value
 from photostrip.strip.fitted_strip import CheckErrors
@@ -49,7 +49,7 @@ def point_columns(result: Result) -> Document:
         correlations = covariances / (sigma[:, :, None] * sigma[:, None, :])
     return {
         **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("xyz")},
-        **{f"correlation_{axes}": correlations[:, k, j] for axes, (k, j) in PLACES.items() if k != j},
+        **{f"correlation_{axes}": correlations[:, k, j] for axes, (k, j) in MIXED.items()},
     }
 
 
@@ -204,14 +204,7 @@ def _check(result: Result, found: Differences) -> Document:
         "tests": Table.of_rows(
             "precision.check.tests",
             (
-                {
-                    "strip": name,
-                    "points": errors.points,
-                    "coordinates": errors.coordinates,
-                    "independent": errors.independent,
-                    "squares": errors.squares,
-                    "p": errors.probability,
-                }
+                {"strip": name, **attributes(errors, "points coordinates independent squares"), "p": errors.probability}
                 for name, errors in tests.items()
             ),
         ),

@@ -18,7 +18,7 @@ from photostrip.pipeline.precision import mean_points
 from photostrip.pipeline.results import Adjusted, Result, StripResult
 from photostrip.points import locate
 from photostrip.result.given import differences, of_used
-from photostrip.result.numbers import MATRIX, record, rms
+from photostrip.result.numbers import MATRIX, attributes, record, rms
 from photostrip.result.table import Table
 from photostrip.strip.formed_strip import FormedStrip
 from photostrip.strip.pair_screening import SEARCHES, GlobalTest, residual_sigma, tested
@@ -389,10 +389,7 @@ def absolute_of(strip: StripResult) -> Document:
         **{f"shift_{axis}": value for axis, value in zip(CARTESIAN_AXES, found.similarity.shift, strict=True)},
         **{f"origin_{axis}": value for axis, value in zip(CARTESIAN_AXES, strip.intermediate.origin, strict=True)},
         **{name.replace("r", "a"): value for name, value in zip(MATRIX, strip.intermediate.axes.ravel(), strict=True)},
-        "sigma0": found.sigma0,
-        "redundancy": found.redundancy,
-        "condition": found.condition,
-        "iterations": found.iterations,
+        **attributes(found, "sigma0 redundancy condition iterations"),
         **{f"misclosure_rms_{axis}": value for axis, value in zip(GROUND_AXES, misclosures, strict=True)},
     }
 
@@ -434,11 +431,7 @@ def _polynomial(strip: str, found: Polynomial) -> Document:
         "stations_height": found.stations[1],
     }
     for name, axis in zip(CARTESIAN_AXES, found.axes, strict=True):
-        values |= {
-            f"sigma0_{name}": axis.sigma0,
-            f"redundancy_{name}": axis.redundancy,
-            f"condition_{name}": axis.condition,
-        }
+        values |= {f"{key}_{name}": value for key, value in attributes(axis, "sigma0 redundancy condition").items()}
     return values
 
 

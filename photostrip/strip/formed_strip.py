@@ -99,8 +99,6 @@ class StripFormationSettings:
     # ``"least_squares"``: all pass points with their precision; ``"distances"``: the textbook's mean of the ratios of
     # distances from the common centre
     scale_transfer: str = "least_squares"
-    # weights of points in that, by name, on top of what the form gives them; 1 for all others
-    scale_weights: dict[str, float] = field(default_factory=dict)
     # ``"mean"``: Y is the mean of both rays; ``"left"``: points lie on the left ray, as in the source
     intersection: str = "mean"
 
@@ -142,7 +140,6 @@ def transfer_scale(
     doubtful: Flags | None = None,
     *,
     searched: bool = False,
-    point_weight: Floats | None = None,
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
@@ -152,7 +149,6 @@ def transfer_scale(
     doubtful: (m,), optional, rows that must not join models, unless a junction has no other.
     searched: whether the rays have been searched for gross errors: then all pass points count. Before that, those that
         lie far from the median of their junction are left out.
-    point_weight: weight of each point on top of that of the form, by number; 0 joins models only where no other does.
     Raises GeometryError when no point is common to three photos in a row.
     """
     junctions = orientation.pairs.size - 1
@@ -162,9 +158,6 @@ def transfer_scale(
     # eq. 139-141: distances from the common centre, before over after
     ratios = np.linalg.norm(vectors[every.before] - base[every.junction], axis=1)
     ratios /= np.linalg.norm(vectors[every.after], axis=1)
-    if point_weight is not None:
-        idle = point_weight[orientation.point] == 0
-        doubtful = idle if doubtful is None else doubtful | idle
     joining = _joining(every, junctions, doubtful)
     (junction, before, after), ratio = (each[joining] for each in every), ratios[joining]
     depth = depths(vectors[before], base[junction]), depths(vectors[after], base[junction + 1])
@@ -173,9 +166,6 @@ def transfer_scale(
     if settings.scale_transfer == "least_squares":
         # a distance from the centre is known to sigma_p / p of itself, and p is inverse to the depth along the base
         weight = quality / (depth[0] ** 2 + depth[1] ** 2)
-    if point_weight is not None:
-        given = point_weight[orientation.point[before]]
-        weight = weight * np.where(given > 0, given, 1.0)
     scatter = _scatter(orientation) if sigma is None else sigma
     # an image coordinate has half the variance of a parallax; that of the common photo acts on both distances
     coordinate = (scatter[junction] ** 2 + scatter[junction + 1] ** 2) / 4 / quality
@@ -366,17 +356,14 @@ def form_from_pairs(
     *,
     searched: bool = False,
     first: FirstPhoto = NOTHING_GIVEN,
-    point_weight: Floats | None = None,
 ) -> FormedStrip:
     """Form the strip from its oriented pairs, in the frame of the first photo unless its angles are given.
 
-    sigma, doubtful, searched, point_weight: as in ``transfer_scale``.
+    sigma, doubtful, searched: as in ``transfer_scale``.
     Raises GeometryError when a junction is broken or a base is parallel to the strip's Z axis.
     """
     models = model_points(orientation, first, left_ray=settings.intersection == LEFT_RAY)
-    junctions = transfer_scale(
-        orientation, models.vectors, settings, photos, sigma, doubtful, searched=searched, point_weight=point_weight
-    )
+    junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, searched=searched)
     formed = place_models(orientation, models, junctions, orientation.used & models.sound, first)
     _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
     return without_rows(formed, orientation, _elsewhere(orientation, formed))

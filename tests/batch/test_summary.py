@@ -19,7 +19,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.batch import parsed_record, summary_csv, summary_json
 from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, outcome_line
 from photostrip.report.page.layout import to_text
-from photostrip.report.page.progress import batch_progress
+from photostrip.report.page.progress import progress
 from tests.batch.projects import started, write_projects
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def test_what_is_no_record_is_not_taken_for_one(content: bytes) -> None:
 
 def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
     stream = io.StringIO()
-    with batch_progress(stream, 2) as shown:
+    with progress(stream, 2, patience=0.0) as shown:
         shown.say("one")
         assert stream.getvalue() == "one\n"
 

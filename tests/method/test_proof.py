@@ -424,12 +424,6 @@ def test_a_check_point_never_influences_anything(change: str, curvature: str) ->
         assert np.abs(np.abs(at_check) - [1e5, 3e5, 4e3]).max() < 10.0
 
 
-@pytest.mark.slow
-def test_twice_is_the_same() -> None:
-    _, inputs = noisy_project()
-    assert document_of(triangulate(inputs, Settings())) == document_of(noisy_result())
-
-
 STEP = 1e-5  # mm, of an image coordinate
 PLAIN = Settings()
 PLAIN = replace(

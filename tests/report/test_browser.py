@@ -56,15 +56,6 @@ FILTERED = """
 """
 
 
-LINKS = """
-({
-  dead: [...document.querySelectorAll("a[href]")].map((each) => each.getAttribute("href"))
-    .filter((href) => !href.startsWith("#") || !document.getElementById(href.slice(1))),
-  twice: [...document.querySelectorAll("[id]")].map((each) => each.id).filter((id, n, all) => all.indexOf(id) !== n),
-})
-"""
-
-
 @cache
 def document(kind: str) -> dict[str, Any]:
     """Give the result of a project of a kind."""
@@ -104,10 +95,6 @@ def test_nothing_fails_and_nothing_is_asked_for(page: Browser) -> None:
     assert [each["request"]["url"].rpartition("/")[2] for each in page.of("Network.requestWillBeSent")] == [
         "report.html"
     ]
-
-
-def test_links_lead_somewhere(page: Browser) -> None:
-    assert page.ask(LINKS) == {"dead": [], "twice": []}
 
 
 def test_tables_sort_and_come_back(page: Browser) -> None:

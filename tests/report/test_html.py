@@ -1,24 +1,29 @@
-"""The report as HTML: everything the text report says, whole, safe, reachable."""
+"""The report as HTML, and that of a batch: everything the text report says, whole, safe, reachable, small."""
 
 from __future__ import annotations
 
-import json
 import re
+from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.result_json import checked, to_json
-from photostrip.report.html import to_html
+from photostrip.report.html import batch_html, to_html
 from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.pictures.commands import batch_maps
 from photostrip.report.pictures.result import pictures_of
 from photostrip.report.sections.accuracy_report import sections_of
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import by_rows, case, in_tables, spec, write_project
+from tests.results import by_rows, case, in_tables, solved, spec, write_project
+from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -164,38 +169,7 @@ def test_ids_cannot_become_elements() -> None:
     assert name in " ".join(Page(text).words)
 
 
-def test_the_same_result_gives_the_same_page() -> None:
-    document = case().document
-    assert to_html(document) == to_html(checked(json.loads(to_json(document)), "result.json"))
-
-
 # ----------------------------------------------------------------------------------------------------- commands
-
-
-@pytest.mark.slow
-def test_run_and_report_write_the_same_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    project = write_project(tmp_path, spec())
-    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--html", "--quiet"]) == 0
-    assert main(["report", str(tmp_path / "out"), "-o", str(tmp_path / "again.html")]) == 0
-    page = (tmp_path / "out/report.html").read_bytes()
-    assert page == (tmp_path / "again.html").read_bytes()
-    assert page.startswith(b"<!DOCTYPE html>")
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.slow
-def test_long_tables_are_whole() -> None:
-    document = by_rows(saved())
-    document["control"] = [row | {"id": f"{row['id']} {n}"} for n in range(9) for row in document["control"]]
-    names = {f"{saved()['control'][0]['id']} {n}" for n in range(9)}
-    assert names <= set(Page(to_html(in_tables(document))).words)
-
-
-def test_the_menu_has_the_order_of_the_page() -> None:
-    text = to_html(saved())
-    menu = re.findall(r'href="#([^"]+)"', text[text.index("<nav") : text.index("</nav>")])
-    assert menu == re.findall(r'<section id="([^"]+)" aria-labelledby', text)
-    assert "pictures" in menu
 
 
 def test_findings_lead_to_rows_and_pictures_and_back() -> None:
@@ -242,3 +216,108 @@ def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
 def test_html_needs_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", str(write_project(tmp_path, spec())), "--html"]) == 2
     assert "--output" in capsys.readouterr().err
+
+
+MOST = 3000  # bytes for each photo
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("photos", "strips"), [(500, 1), (20, 20)])
+def test_pages_grow_by_at_most_three_megabytes_for_a_thousand_photos(photos: int, strips: int) -> None:
+    flight = Flight(photos=photos, strips=strips, heading_deg=70.0)
+    document = solved(inputs_of(simulate(replace(spec(strips=strips), flight=flight)))).document
+    assert len(document["photos"]) == photos * strips
+    page = to_html(document)
+    assert all(f"photo {photo}" in page for photo in nonempty(sorted({each["id"] for each in document["photos"]})))
+    assert len(page.encode("utf-8")) <= MOST * photos * strips
+
+
+@pytest.mark.slow
+def test_the_page_of_fifty_thousand_points_is_thinned_and_says_so() -> None:
+    document = by_rows(case().document)
+    times = 50_000 // len(document["points"]) + 1
+    move = np.random.default_rng(1).uniform(-400.0, 400.0, (times, 2))
+    document["points"] = [
+        row | {"id": f"{row['id']}.{n}", "role": "new", "x": row["x"] + x, "y": row["y"] + y}
+        for n, (x, y) in enumerate(move.tolist())
+        for row in document["points"]
+    ]
+    document["residuals"] = [
+        row | {"point": f"{row['point']}.{n}"} for n in range(times) for row in document["residuals"]
+    ]
+    page = to_html(in_tables(document))
+    assert len(page.encode("utf-8")) < 5_000_000
+    assert f"Of {len(document['points'])} points one in " in page
+    assert "Of each photo the 150 largest are drawn." in page
+
+
+EARTH, MOON = 6378137.0, 1737400.0
+
+
+def outcome(name: str, status: str = "good", **more: Any) -> dict[str, Any]:  # noqa: ANN401
+    found = {
+        "project": f"strips/{name}/project.yaml", "output": name, "status": status, "exit_code": 0, "photos": 5,
+        "points": 40, "rejected": 1, "sigma0_um": 4.8, "rms_at": "check", "rms_plan_m": 0.1, "rms_height_m": 0.2,
+        "messages": [], "findings": [], "body": EARTH, "track": [[[15.0, 50.0], [15.1, 50.01]]],
+    }  # fmt: skip
+    return found | more
+
+
+FAULTY = {
+    "output": None, "messages": ["observations.csv:3: is wrong"], "body": None, "track": None,
+    **dict.fromkeys(("photos", "points", "rejected", "sigma0_um", "rms_at", "rms_plan_m", "rms_height_m")),
+}  # fmt: skip
+OUTCOMES = [
+    outcome("a"),
+    outcome("b & c", "look", messages=["photo 7 is odd"]),
+    outcome("moon", body=MOON, track=[[[3.6, 26.1], [3.0, 26.1]]]),
+    outcome("local", body=None, track=None),
+    outcome("bad", "faulty", exit_code=2, **FAULTY),
+]
+
+
+def test_every_project_leads_to_its_report_and_a_faulty_one_to_none() -> None:
+    page = batch_html(OUTCOMES, "1")
+    assert re.findall(r'<a href="([^"#]+)"', page) == [
+        "a/report.html", "b%20%26%20c/report.html", "moon/report.html", "local/report.html"
+    ]  # fmt: skip
+    assert all(f"strips/{name}/project.yaml" in page for name in ("a", "moon", "local", "bad"))
+    assert page == batch_html(OUTCOMES, "1")
+
+
+def test_the_worst_comes_first() -> None:
+    page = batch_html(OUTCOMES, "1")
+    texts = ("1 faulty, 1 look, 3 good", "What is wrong</h2>", ":3: is wrong", "photo 7 is odd")
+    order = [page.index(text) for text in texts]
+    assert order == sorted(order)
+
+
+def test_each_body_has_a_map_of_its_own_with_all_its_strips() -> None:
+    maps = batch_maps(OUTCOMES)
+    assert [each.svg.count('class="line good') + each.svg.count('class="line look') for each in maps] == [2, 1]
+    assert maps[0].title == "2 projects on a body of 6378 km radius"
+    assert maps[1].title == "1 project on a body of 1737 km radius"
+    assert "b &amp; c" in maps[0].svg
+    assert batch_maps([outcome("local", body=None, track=None)]) == []
+
+
+def test_a_map_keeps_lengths_and_north() -> None:
+    """At 60 degrees a degree of longitude is half as long as one of latitude."""
+    (drawn,) = batch_maps([outcome("a", track=[[[10.0, 60.0], [10.2, 60.0]], [[10.0, 59.95], [10.0, 60.05]]])])
+    lines = re.findall(r'<path d="M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)" class="line good', drawn.svg)
+    (x1, y1, x2, y2), (u1, v1, u2, v2) = (map(float, each) for each in nonempty(lines))
+    assert y1 == y2
+    assert u1 == u2
+    assert x2 > x1
+    assert v2 < v1  # north is up
+    assert abs((x2 - x1) - (v1 - v2)) < 0.5
+
+
+def test_names_on_the_map_do_not_lie_on_each_other() -> None:
+    side_by_side = [outcome(f"strip-{n}", track=[[[15.0, 50.0 + n / 100], [15.3, 50.0 + n / 100]]]) for n in range(200)]
+    (picture,) = batch_maps(side_by_side)
+    labels = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" class="label id"[^>]*>(strip-\d+)<', picture.svg)
+    places = [(float(x), float(y)) for x, y, _ in nonempty(labels)]
+    assert len(labels) < len(side_by_side)
+    for (x, y), (u, v) in nonempty(list(combinations(places, 2))):
+        assert abs(x - u) > 40 or abs(y - v) > 10

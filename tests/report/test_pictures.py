@@ -15,9 +15,9 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.pipeline.inputs import Settings
-from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel, chart, nice
-from photostrip.report.pictures.footprints import footprint_pictures, footprints
+from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel, chart
 from photostrip.report.pictures.places import plan_of, rays_of
+from photostrip.report.pictures.plan import footprint_pictures, footprints
 from photostrip.report.pictures.result import picture_files, pictures_of
 from photostrip.result.numbers import MATRIX
 from photostrip.simulation import Models
@@ -207,11 +207,6 @@ def test_many_points_are_thinned_and_the_caption_says_so() -> None:
     picture = chart("many", ("Many", "A caption.", ""), [Map([Marks(at, words="new point")])])
     assert picture.svg.count("h0") == MOST_DOTS
     assert picture.caption == f"A caption. Of {3 * MOST_DOTS} points one in 3 is drawn."
-
-
-@pytest.mark.parametrize(("size", "expected"), [(0.03, 0.05), (1.0, 1.0), (1.01, 2.0), (7.0, 10.0), (0.0, 1.0)])
-def test_round_numbers(size: float, expected: float) -> None:
-    assert nice(size) == pytest.approx(expected)
 
 
 def test_ticks_are_round_and_inside() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,13 +80,6 @@ def test_the_saved_result_has_the_keys_of_a_fresh_one() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ from the file
-
-
-@pytest.mark.parametrize("frame", FRAMES)
-@pytest.mark.parametrize("width", [60, 100, 200])
-def test_the_report_of_the_file_is_that_of_the_run(frame: str, width: int) -> None:
-    document = case(frame).document
-    assert printed(checked(json.loads(to_json(document)), "result.json"), width) == printed(document, width)
 
 
 @pytest.mark.parametrize("width", [60, 80, 140, 200])
@@ -189,20 +181,6 @@ def test_ranks_keep_the_point_and_its_differences() -> None:
         assert [column.name for column in table.columns if column.rank == 0] == names
 
 
-def test_rows_of_a_table_have_all_its_columns() -> None:
-    for found in nonempty(sections_of(saved())):
-        for table in tables(found):
-            assert all(len(row) == len(table.columns) for row in (*table.rows, *table.foot)), found.title
-
-
-def test_check_points_stand_apart_from_the_control() -> None:
-    control, check = (tables(section(saved(), title))[0] for title in ("Control points", "Check points"))
-    roles = {row["id"]: row["role"] for row in saved()["control"]}
-    assert {roles[row[0]] for row in control.rows} == {"control"}
-    assert {roles[row[0]] for row in check.rows} == {"check"}
-    assert [row[0] for row in check.foot] == ["rms", "mean", "largest", "in 95 %"]
-
-
 def test_numbers_are_those_of_the_result() -> None:
     document = case("north first", 2).document
     (table,) = tables(section(document, "Check points"))
@@ -251,17 +229,6 @@ def test_without_check_points_the_report_says_what_that_means() -> None:
     assert words(section(changed(control=control), "Check points")).startswith("None. What lies between")
 
 
-def test_rejections_give_their_reason() -> None:
-    (table,) = tables(section(saved(), "Rejected"))
-    assert len(table.rows) == len(saved()["rejected"])
-    for shown, row in nonempty(zip(table.rows, saved()["rejected"], strict=True)):
-        assert (shown[0], shown[2], shown[-1]) == (row["point"], row["test"], row["reason"])
-
-
-def test_nothing_rejected_is_said_too() -> None:
-    assert words(section(changed(rejected=[]), "Rejected")) == "Nothing was rejected."
-
-
 def test_points_without_coordinates_are_grouped_by_reason() -> None:
     missing = [{"id": f"P{n}", "reason": "measured on one photo"} for n in range(15)]
     missing.append({"id": "Q", "reason": "rejected in every pair"})
@@ -308,14 +275,6 @@ def test_screening_is_stated(settings: Document, text: str) -> None:
 
 
 # ------------------------------------------------------------------------------------------------------ Markdown
-
-
-def test_markdown_tables_are_whole() -> None:
-    text = to_markdown("T", sections_of(saved()))
-    blocks = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
-    assert len(blocks) == sum(len(tables(each)) for each in sections_of(saved()))
-    for block in nonempty(blocks):
-        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}) == 1
 
 
 def test_markdown_escapes_ids() -> None:

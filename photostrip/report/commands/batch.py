@@ -31,24 +31,12 @@ STYLES = {"good": "good", "unverified": "look", "look": "look", "not run": "look
 
 
 def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everything: bool = False) -> list[Section]:
+    """Return projects, what is wrong (with everything also what is to be looked at), and last the verdict."""
     sections = [] if quiet else [Section("Projects", (_table(outcomes, everything=everything),))]
-    wrong = [each for each in _worst_first(outcomes) if each["exit_code"]]
+    wrong = [each for each in _worst_first(outcomes) if each["exit_code"] or (everything and each["messages"])]
     if wrong:
         sections.append(Section("What is wrong", tuple(_messages(wrong, everything=everything))))
     return [*sections, Section("Verdict" if sections else "", (Words(counts(outcomes), _style(outcomes)),))]
-
-
-def batch_page_sections(outcomes: Sequence[Document]) -> list[Section]:
-    """Return the summary as sections of a page: every project with a link to its report, then the worst things."""
-    pages = tuple(f"{quote(each['output'])}/report.html" if each["output"] else "" for each in outcomes)
-    found = [
-        Section("Verdict", (Words(counts(outcomes), _style(outcomes)),)),
-        Section("Projects", (replace(_table(outcomes, everything=True), pages=pages),)),
-    ]
-    worst = [each for each in _worst_first(outcomes) if each["messages"]]
-    if worst:
-        found.append(Section("The worst things", tuple(_messages(worst[:MOST_ROWS], everything=False))))
-    return found
 
 
 def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
@@ -56,11 +44,14 @@ def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
 
 
 def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
-    """Return the table of the projects; of too many, the worst."""
+    """Return the table of the projects, on a page with links to their reports; of too many, the worst."""
     shown = outcomes if everything or len(outcomes) <= MOST_ROWS else _worst_first(outcomes)[:MOST_ROWS]
     more = counted(len(outcomes) - len(shown), "more project")
     note = f"{more} not shown, none of them worse: see --verbose or summary.csv" if len(shown) < len(outcomes) else ""
-    return tabulated(COLUMNS, ([each[column.key] for column in COLUMNS] for each in shown), note)
+    table = tabulated(COLUMNS, ([each[column.key] for column in COLUMNS] for each in shown), note)
+    return replace(
+        table, pages=tuple(f"{quote(each['output'])}/report.html" if each["output"] else "" for each in shown)
+    )
 
 
 def _messages(wrong: Sequence[Document], *, everything: bool) -> list[Words]:

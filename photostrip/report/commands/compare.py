@@ -251,7 +251,11 @@ def compare_findings(document: Document, lines_of: Callable[[str], Callable[[str
     ``lines_of`` gives for a baseline what finds the line of a block and an id, 0 when it is not there. What is too much
     to show is counted in the last finding.
     """
-    found = [each for one in document.get("results", [document]) for each in _findings(one, lines_of(one["baseline"]))]
+    found = [
+        _finding(one["baseline"], lines_of(one["baseline"])(*place), text)
+        for one in document.get("results", [document])
+        for _, place, text in _texts(one)
+    ]
     found += [
         EMPTY | {key: each[key] for key in ("file", "line", "code", "message")} | {"severity": "error"}
         for each in document.get("refused", ())
@@ -263,17 +267,17 @@ def compare_findings(document: Document, lines_of: Callable[[str], Callable[[str
     return [*found[:MOST_ANNOTATIONS], _finding(document["baseline"], 0, rest)]
 
 
-def _findings(document: Document, line_of: Callable[[str, str], int]) -> Iterator[Document]:
-    file = document["baseline"]
+def _texts(document: Document) -> Iterator[tuple[str, tuple[str, str], str]]:
+    """Say each difference in a sentence, with its kind, and with block and key of the record of the baseline."""
     for each in document["sets"]:
         differ = [(name, row) for name in ALONE for row in each[name] if each["differs"]]
         for name, row in differ:
-            yield _finding(file, line_of(row["block"], "id"), f"{_name(each)}: {row['what']} is {name}")
+            yield each["kind"], (row["block"], "id"), f"{_name(each)}: {row['what']} is {name}"
     for row in document["lacking"]:
         if row["differs"]:
-            yield _finding(file, line_of(row["block"], ""), _lacking(document, row))
+            yield row["kind"], (row["block"], ""), _lacking(document, row)
     for row in document["differences"]:
-        yield _finding(file, line_of(row["block"], row["name"].partition(".")[0]), sentence(row))
+        yield row["kind"], (row["block"], row["name"].partition(".")[0]), sentence(row)
 
 
 def _finding(file: str, line: int, message: str) -> Document:
@@ -298,18 +302,12 @@ def compare_cases(document: Document) -> Iterator[Case]:
         yield from (Case(each["folder"], error=each["message"]) for each in document["refused"])
         yield from (Case(folder, error=why) for key, why in ALONE.items() for folder in document[key])
         return
-    for kind in document["kinds"]:
-        gone = [row for row in document["lacking"] if row["kind"] == kind["kind"] and row["differs"]]
-        rows = [sentence(row) for row in document["differences"] if row["kind"] == kind["kind"]]
-        parts = [f"{kind['different']} of {kind['compared']} beyond {_allowed(kind)}"] if kind["different"] else []
-        parts += [f"the result lacks {sum(row['numbers'] for row in gone)}"] if gone else []
-        yield _case(kind, "; ".join(parts), [*rows, *(_lacking(document, row) for row in gone)])
-    for each in document["sets"]:
-        rows = [f"{key}: {row['what']}" for key in ALONE for row in each[key]]
-        yield _case(each, _missing(each) if each["differs"] else "", rows)
-
-
-def _case(kind: Document, failure: str, rows: Sequence[str]) -> Case:
-    if kind["ignored"]:
-        return Case(_name(kind), skipped="not compared")
-    return Case(_name(kind), failure, "\n".join(rows)) if failure else Case(_name(kind))
+    texts: dict[str, list[str]] = {}
+    for name, _, text in _texts(document):
+        texts.setdefault(name, []).append(text)
+    for kind in (*document["kinds"], *document["sets"]):
+        own = texts.get(kind["kind"], [])
+        allowed = f" beyond {_allowed(kind)}" if "relative" in kind["allowed"] else ""
+        failure = f"{counted(len(own), 'difference')}{allowed}" if own else ""
+        skipped = "not compared" if kind["ignored"] else ""
+        yield Case(_name(kind), "" if skipped else failure, "\n".join(own), skipped)

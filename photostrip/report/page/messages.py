@@ -27,37 +27,18 @@ NUMBER = re.compile(r"\d+")  # in the path of a key: which of a list it is
 
 
 def finding_of(source: Fault | Note | Finding) -> Document:
-    """Return a fault, a note or a finding as plain values; 0 and empty texts where nothing is known."""
-    found: Document = {
-        "severity": "error" if isinstance(source, Fault) else source.severity,
-        "code": source.code,
-        "file": source.file,
-        "line": source.line,
-        "column": source.column,
-        "key": source.key,
-        "message": source.message,
-    }
+    """Return a fault, a note or a finding as plain values; 0 and empty texts where nothing is known.
+
+    A finding that the project accepts is no error and needs no cure.
+    """
+    own = {key: list(value) if isinstance(value, tuple) else value for key, value in vars(source).items()}
+    own.pop("strip", None)  # of a note: its message names it
+    found: Document = {"severity": "error", "code": "", "message": "", **EMPTY, **own}
     if isinstance(source, Finding):
-        return found | _of_finding(source)
-    if isinstance(source, Fault):
-        return found | {"expected": source.expected, "fix": source.fix, "photos": [], "points": list(source.points)}
-    return found | {"expected": "", "fix": "", "photos": list(source.photos), "points": list(source.points)}
-
-
-def _of_finding(finding: Finding) -> Document:
-    """Return what a finding has beside message and place; an accepted one is no error and needs no cure."""
-    return {
-        "severity": "note" if finding.accepted else finding.severity,
-        "message": f"{ACCEPTED if finding.accepted else ''}{finding.message}",
-        "expected": "",
-        "fix": "" if finding.accepted else finding.fix,
-        "photos": list(finding.photos),
-        "points": list(finding.points),
-        "strips": list(finding.strips),
-        "title": finding.title,
-        "accepted": finding.accepted,
-        "evidence": dict(finding.evidence),
-    }
+        found["evidence"] = dict(source.evidence)
+        if source.accepted:
+            found |= {"severity": "note", "message": f"{ACCEPTED}{source.message}", "fix": ""}
+    return found
 
 
 def findings_of(error: InputError | GeometryError) -> list[Document]:

@@ -1,137 +1,104 @@
-"""A line on stderr while something takes long: what is being done, how far it is, for how many seconds.
+"""What is being done, on a terminal while something takes long: a spinner, or a bar where the number of steps is known.
 
-Only a person who waits at a terminal sees it. It appears after a second, is wiped away when the work is done, and
-never stands in a pipe, a file or the log of a job. A batch has a bar instead.
+Only a person who waits at a terminal sees it. It is wiped away when the work is done, and never stands in a pipe, a
+file or the log of a job: there what is said goes straight to the stream.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import threading
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any, TextIO
 
 from photostrip.notes import listed
-from photostrip.report.page.layout import cells, cut
+from photostrip.report.page.layout import cut
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
-PATIENCE = 1.0  # seconds before anything is shown
-LOOK_EVERY = 0.2  # seconds between two looks
-WIPE = "\r\x1b[2K"
-WHEEL = "|/-\\"
+PATIENCE = 1.0  # seconds before anything is shown of a single job
+BAR, COUNTS = 12, 24  # cells of the bar, and of what else stands beside the text
+
+
+class _Steady:
+    """A terminal: when it is gone, the work is not."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> None:
+        with suppress(OSError, ValueError):
+            self._stream.write(text)
+
+    def flush(self) -> None:
+        with suppress(OSError, ValueError):
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 (whatever a stream has)
+        return getattr(self._stream, name)
 
 
 class Progress:
-    """The line on one terminal; the total, of steps to do, is 0 when it is not known."""
+    """How far the work is, on one terminal; the total, of steps to do, is 0 when it is not known."""
 
-    def __init__(self, stream: TextIO, total: int = 0) -> None:
-        self.stream, self.total, self.done, self.text = stream, total, 0, ""
-        self._begin = time.monotonic()
-        self._stop = threading.Event()
-        self._shown = False
-
-    def at(self, text: str) -> None:
-        """Say what is being done now; with a total, it is one more of the steps."""
-        self.done += bool(self.total)
-        self.text = text
-
-    def line(self, seconds: float, width: int) -> str:
-        """Return the line after some seconds, cut to a width."""
-        turn = WHEEL[int(seconds / LOOK_EVERY) % len(WHEEL)]
-        count = f" {self.done} of {self.total}" if self.total else ""
-        head, tail = f"{turn}{count} ", f" {seconds:.0f} s"
-        return head + cut(visible(self.text), max(width - cells(head + tail) - 1, 0), "...") + tail
-
-    def run(self) -> None:
-        """Show the line again and again until the work is done."""
-        while not self._stop.wait(LOOK_EVERY):
-            seconds = time.monotonic() - self._begin
-            if seconds >= PATIENCE:
-                self._shown = True
-                self._write(WIPE + self.line(seconds, _columns(self.stream)))
-
-    def stop(self, worker: threading.Thread) -> None:
-        """Take the line away when the thread that shows it has drawn for the last time."""
-        self._stop.set()
-        worker.join()
-        if self._shown:
-            self._write(WIPE)
-
-    def _write(self, text: str) -> None:
-        try:
-            self.stream.write(text)
-            self.stream.flush()
-        except (OSError, ValueError):  # the terminal is gone; the work is not
-            self._stop.set()
-
-
-def wanted(stream: TextIO, environment: Mapping[str, str]) -> bool:
-    """Whether somebody waits there: a terminal that can wipe a line."""
-    return stream.isatty() and environment.get("TERM", "") not in {"dumb", "unknown"}
-
-
-def _columns(stream: TextIO) -> int:
-    try:
-        return os.get_terminal_size(stream.fileno()).columns or 80
-    except (OSError, ValueError):
-        return 80
-
-
-@contextmanager
-def progress(stream: TextIO, total: int = 0, *, quiet: bool = False) -> Iterator[Progress]:
-    """Show progress while a block runs, where the stream is a terminal; ``Progress.at`` says what is being done."""
-    line = Progress(stream, total)
-    if quiet or not wanted(stream, os.environ):
-        yield line
-        return
-    worker = threading.Thread(target=line.run, daemon=True)
-    worker.start()
-    try:
-        yield line
-    finally:
-        line.stop(worker)
-
-
-class BatchProgress:
-    """How far a batch is, on a terminal; where there is none, what is said goes straight to the stream."""
-
-    def __init__(self, stream: TextIO, total: int, *, live: bool) -> None:
+    def __init__(self, stream: TextIO, total: int, *, live: bool, patience: float) -> None:
         self.stream, self.total, self.live = stream, total, live
         self._running: dict[str, None] = {}
+        self._done, self._text = 0, ""
         self._bar: RichProgress | None = None
-        if live:
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-            from rich.progress import Progress as Bar
+        self._waiting = threading.Thread(target=self._show, args=[patience], daemon=True)
+        self._stopped = threading.Event()
+        if live and patience:
+            self._waiting.start()
+        elif live:
+            self._show(patience)
 
-            columns = BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn()
-            console = Console(file=stream, highlight=False, markup=False)
-            names = TextColumn("{task.description}", markup=False)
-            self._bar = Bar(*columns, names, console=console, transient=True)
-            self._task = self._bar.add_task("", total=total)
-            self._bar.start()
+    def _show(self, patience: float) -> None:
+        if self._stopped.wait(patience):
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as Bar
+
+        begin = (BarColumn(BAR), MofNCompleteColumn()) if self.total else (SpinnerColumn("line"),)
+        text = TextColumn("{task.description}", markup=False)
+        console = Console(file=_Steady(self.stream), highlight=False, markup=False)  # type: ignore[arg-type]
+        bar = Bar(*begin, TimeElapsedColumn(), text, console=console, transient=True)
+        self._task = bar.add_task(self._text, total=self.total or None, completed=self._done)
+        bar.start()
+        self._bar = bar
+        self._update(self._text, 0)  # what was said meanwhile
 
     def stop(self) -> None:
+        """Take away what is shown."""
+        self._stopped.set()
+        if self._waiting.is_alive():
+            self._waiting.join()
         if self._bar is not None:
             self._bar.stop()
 
+    def at(self, text: str) -> None:
+        """Say what is being done now; with a total, it is one more of the steps."""
+        self._update(text, bool(self.total))
+
     def begun(self, project: str) -> None:
-        """Say that a project is being computed now."""
+        """Say that one of several projects is being computed now."""
         self._running[project] = None
-        self._update(0)
+        self._update(listed(self._running), 0)
 
     def finished(self, project: str) -> None:
         self._running.pop(project, None)
-        self._update(1)
+        self._update(listed(self._running), 1)
 
-    def _update(self, steps: int) -> None:
+    def _update(self, text: str, steps: int) -> None:
+        room = shutil.get_terminal_size().columns - BAR - COUNTS
+        self._text, self._done = cut(visible(text), max(room, COUNTS), "..."), self._done + steps
         if self._bar is not None:
-            self._bar.update(self._task, advance=steps, description=visible(listed(self._running)))
+            self._bar.update(self._task, completed=self._done, description=self._text)
 
     def say(self, text: str) -> None:
         """Say something, above the bar where there is one."""
@@ -143,9 +110,10 @@ class BatchProgress:
 
 
 @contextmanager
-def batch_progress(stream: TextIO, total: int, *, quiet: bool = False) -> Iterator[BatchProgress]:
-    """Show how far a batch is while a block runs, where the stream is a terminal."""
-    shown = BatchProgress(stream, total, live=not quiet and wanted(stream, os.environ))
+def progress(stream: TextIO, total: int = 0, *, quiet: bool = False, patience: float = PATIENCE) -> Iterator[Progress]:
+    """Show progress while a block runs, where somebody waits: at a terminal that can wipe a line."""
+    live = not quiet and stream.isatty() and os.environ.get("TERM", "") not in {"dumb", "unknown"}
+    shown = Progress(stream, total, live=live, patience=patience)
     try:
         yield shown
     finally:

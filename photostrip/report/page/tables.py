@@ -1,7 +1,7 @@
 """Tables of a page: their columns described once, those of a result by ``result/quantities.txt``.
 
 The form of a column is its unit and how its numbers are printed: ``"m 3"``; ``"m +3"`` with a sign, ``"mm g9"`` by
-digits, ``"mm² e4"`` as a power, `` %1`` as percent; ``"ratio 2"`` has no unit; words have no form.
+digits, ``"mm² e4"`` as a power, ``" %1"`` as percent; ``"ratio 2"`` has no unit; words have no form.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ DIGITS = "g4"  # of numbers without a natural size
 BETWEEN = " – "  # of the photos of a pair
 LEAST_PROBABILITY = 0.001  # smaller ones are all shown as smaller than this
 Number = float | None
+Rows = Any  # a table of a result, or dictionaries
 
 
 class Cell(NamedTuple):
@@ -150,12 +151,11 @@ def fields(keys: str, form: str, heads: str = "", below: str | None = None, rank
     return tuple(Field(key, form, name, below, rank) for key, name in zip(keys.split(), names, strict=True))
 
 
-def tabulated(columns: Sequence[Field], rows: Iterable[Sequence[Any]], note: str = "", foot: Foot = ()) -> Table:
+def tabulated(columns: Sequence[Field], rows: Iterable[Sequence[Any]], note: str = "") -> Table:
     """Return a table of rows, each with a value for every column."""
     shown = [(place, each) for place, each in enumerate(columns) if each.shown]
     cells = tuple(tuple(written(row[place], each.form) for place, each in shown) for row in rows)
-    end = tuple(tuple(line.get(each.key, "") for _, each in shown) for line in foot)
-    return Table(tuple(each.column for _, each in shown), cells, end, note)
+    return Table(tuple(each.column for _, each in shown), cells, note=note)
 
 
 Foot = Sequence[Mapping[str, str]]  # texts of the last lines by the keys of their columns
@@ -163,7 +163,7 @@ Computed = tuple[Field, Sequence[Any]]  # a column that a result does not have, 
 
 
 def keyed(
-    rows: Any,  # noqa: ANN401 (a table of a result, or dictionaries)
+    rows: Rows,
     keys: str,
     note: str = "",
     *,
@@ -201,7 +201,7 @@ def keyed(
     return Table(tuple(column for column, _ in shown.values()), cells, end, note)
 
 
-def _described(rows: Any, key: str, entry: Any, rank: int) -> tuple[Column, list[str]]:  # noqa: ANN401 (a description)
+def _described(rows: Rows, key: str, entry: Any, rank: int) -> tuple[Column, list[str]]:  # noqa: ANN401 (a description)
     """Return a column of a result as its description says."""
     values, unit, spec, left = column_of(rows, key), entry.unit.replace("`unit`", ""), entry.shown, False
     if entry.kind == "flag":
@@ -225,7 +225,7 @@ def _described(rows: Any, key: str, entry: Any, rank: int) -> tuple[Column, list
     return Column(entry.head, below, left, rank), [written(each, f" {spec}" if spec else "") for each in values]
 
 
-def column_of(rows: Any, key: str) -> list[Any]:  # noqa: ANN401 (a table of a result, or dictionaries)
+def column_of(rows: Rows, key: str) -> list[Any]:
     """Return the values of a key; of a table without making its rows."""
     return list(rows.values(key)) if hasattr(rows, "values") else [row[key] for row in rows]
 
@@ -235,12 +235,12 @@ def elsewhere(rest: int, what: str, section: str, block: str) -> str:
     return f"{rest} more {what}: --section {section}, or `{block}` in result.json"
 
 
-def taken(rows: Any, places: Sequence[int]) -> Any:  # noqa: ANN401 (a table of a result, or dictionaries)
+def taken(rows: Rows, places: Sequence[int]) -> Rows:
     """Return the rows at some places."""
     return rows[list(places)] if hasattr(rows, "columns") else [rows[place] for place in places]
 
 
-def largest_of(rows: Any, key: str, most: int) -> list[int]:  # noqa: ANN401 (the same)
+def largest_of(rows: Rows, key: str, most: int) -> list[int]:
     """Return the places of the rows with the largest values of a key, where it is known."""
     sizes = column_of(rows, key)
     known = (place for place, size in enumerate(sizes) if size is not None)
@@ -248,7 +248,7 @@ def largest_of(rows: Any, key: str, most: int) -> list[int]:  # noqa: ANN401 (th
 
 
 def worst_first(
-    rows: Any,  # noqa: ANN401 (the same)
+    rows: Rows,
     by: str | Sequence[float],
     where: tuple[str, str, str],
     most: int | None,

@@ -1,4 +1,4 @@
-"""Along the strips: what is left at given points before and after, the polynomial, precision."""
+"""Along the strips: what is left at given points, precision, check points, y parallaxes by the six zones of a pair."""
 
 from __future__ import annotations
 
@@ -9,13 +9,27 @@ import numpy as np
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.tables import short
-from photostrip.report.pictures.chart import Floats, Layer, Line, Marks, Panel, Segments, chart, span
+from photostrip.report.pictures.chart import (
+    Areas,
+    Floats,
+    Layer,
+    Line,
+    Marks,
+    Names,
+    Panel,
+    Segments,
+    box,
+    chart,
+    nice,
+    span,
+)
 from photostrip.report.pictures.places import Course, Plan, numbers
 from photostrip.report.pictures.plan import ROLES
 from photostrip.report.pictures.svg import Picture
 
 MOST_STRIPS = 8  # that have panels
 AXES = ("along", "x"), ("across", "y"), ("up", "z")  # of a strip, and of its polynomials
+LEAST_KM = 2.0
 CURVE_STEPS = 48
 
 
@@ -67,12 +81,14 @@ def deformation_pictures(plan: Plan) -> list[Picture]:
 
 def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Document]) -> list[Panel]:
     course = plan.course(strip)
-    at, shift = course.along(plan.points[after]), course.turned(plan.shift[after])
+    ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
+    of_km, unit = _unit(float(np.ptp(ends)))
+    at, shift = of_km * course.along(plan.points[after]), course.turned(plan.shift[after])
     earlier = [row for row in before if row["id"] in plan.row]
-    earlier_at = course.along(plan.points[plan.rows(row["id"] for row in earlier)])
+    earlier_at = of_km * course.along(plan.points[plan.rows(row["id"] for row in earlier)])
     to_plan = Course(np.zeros(2), plan.north[::-1])  # of east, north and up
     missed = course.turned(to_plan.turned(numbers(earlier, "east", "north", "up")))
-    ends = course.along(plan.photos[plan.strips[strip]][[0, -1]])
+    ends = of_km * ends
     reach = span(np.concatenate([ends, at, earlier_at]), zero=False, room=0.02)
     block = next((row for row in plan.document.get("polynomials", []) if row["strip"] == strip), None)
     terms = list(plan.document["polynomial_terms"].where(strip=strip)) if block else []
@@ -83,12 +99,13 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
         of_axis = [row for row in terms if row["axis"] == key]
         if block and of_axis and earlier:
             places = np.linspace(min(*ends, *earlier_at), max(*ends, *earlier_at), CURVE_STEPS)
-            start = float(block["reach_from"]) - 1000.0 * float(earlier_at.min())  # X of the first photo
-            curve = np.column_stack([places, -polynomial(of_axis, 1000.0 * places + start)])
+            metres = 1000.0 / of_km
+            start = float(block["reach_from"]) - metres * float(earlier_at.min())  # X of the first photo
+            curve = np.column_stack([places, -polynomial(of_axis, metres * places + start)])
             layers.append(Line(curve, "c2", "polynomial" if taken else "polynomial, not taken"))
         hints = [f"{row['id']} before: {size:+.3f} m" for row, size in zip(earlier, missed[:, number], strict=True)]
         at_before = np.column_stack([earlier_at, missed[:, number]])
-        layers += [Marks(at_before, "soft open", "dot", hints, "control before", 7.0)] if earlier else []
+        layers.append(Marks(at_before, "soft open", "dot", hints, "control before", 7.0))
         for role, (words, shape, _) in ROLES.items():
             own = [n for n, row in enumerate(after) if plan.role[row] == role]
             if own:
@@ -97,9 +114,14 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
                 layers.append(Segments(places * (1.0, 0.0), places, f"{role} thin"))
                 layers.append(Marks(places, role, shape, hints, words, 4.0))
         title = f"strip {strip}, {axis}" if len(plan.document["strips"]) > 1 else axis
-        labels = "km along the strip" if strip else "km from the first photo", "m"
+        labels = f"{unit} along the strip" if strip else f"{unit} from the first photo", "m"
         panels.append(Panel(layers, title, labels, x=reach))
     return panels
+
+
+def _unit(reach: float) -> tuple[float, str]:
+    """Return what a kilometre has of the unit of an axis, and its name; a reach of 2 km and more is told in km."""
+    return (1.0, "km") if reach >= LEAST_KM else (1000.0, "m")
 
 
 def polynomial(terms: Sequence[Document], x: Floats) -> Floats:
@@ -133,9 +155,13 @@ def precision_pictures(document: Document) -> list[Picture]:
     shown, high = worst_strips(sizes), span(list(sizes.values()))
     panels = []
     for strip in shown:
-        km = numbers(by_strip[strip], "distance") / 1000.0
-        layers = [Line(np.hstack([km, numbers(by_strip[strip], key)]), kind, words) for key, words, kind in CURVES]
-        panels.append(Panel(layers, f"strip {strip}" if len(sizes) > 1 else "", ("km along the strip", "m"), y=high))
+        at = numbers(by_strip[strip], "distance") / 1000.0
+        of_km, unit = _unit(float(np.nanmax(at, initial=0.0)))
+        layers = [
+            Line(np.hstack([of_km * at, numbers(by_strip[strip], key)]), kind, words) for key, words, kind in CURVES
+        ]
+        title = f"strip {strip}" if len(sizes) > 1 else ""
+        panels.append(Panel(layers, title, (f"{unit} along the strip", "m"), y=high))
     caption = (
         "Standard deviations along each strip, mean of the points near each photo: they are smallest where the control"
         " stands."
@@ -147,3 +173,100 @@ def precision_pictures(document: Document) -> list[Picture]:
              if points[name]["max"] is not None]  # fmt: skip
     words = "Precision along the strip", caption, "; ".join(worst) or "Not known."
     return [chart("precision", words, panels, columns=min(2, len(shown)), height=210.0 if len(shown) == 1 else 140.0)]
+
+
+LIMITS = {"plan": 2.448, "height": 1.960}  # 95 % of a length in plan by its covariance, and of a height
+
+
+def check_pictures(document: Document) -> list[Picture]:
+    """Draw check points over their standard deviations; nothing where these are not known."""
+    rows: list[Document] = document.get("precision", {}).get("check", {}).get("points") or []
+    sizes = numbers(rows, *LIMITS)
+    if not np.isfinite(sizes).any():
+        return []
+    ids = np.array([row["id"] for row in rows])
+    ends = 0.0, len(rows) + 1.0
+    panels = []
+    for (part, limit), size in zip(LIMITS.items(), sizes.T, strict=True):
+        at = np.column_stack([np.arange(1, len(rows) + 1), size])
+        worst = np.argsort(-np.abs(np.nan_to_num(size)), kind="stable")
+        sides = np.array([[limit], [-limit if part == "height" else limit]])
+        band = box(ends, (-limit if part == "height" else 0.0, limit))
+        left, right = (np.hstack([np.full_like(sides, end), sides]) for end in ends)
+        layers: list[Layer] = [Areas([band], "area c1")]
+        layers.append(Segments(left, right, "failed dashed", words="limit of 95 %"))
+        layers.append(Segments(at * (1.0, 0.0), at, "check thin"))
+        hints = np.array([f"check point {name}: {each:+.2f}" for name, each in zip(ids, size, strict=True)])
+        outside = np.abs(size) > limit
+        looks = (~outside, "check", "square", "inside"), (outside, "failed open", "diamond", "outside")
+        layers += [Marks(at[own], kind, shape, hints[own].tolist(), words, 4.0) for own, kind, shape, words in looks]
+        known = [n for n in worst if np.isfinite(size[n])]
+        layers.append(Names(at[known], ids[known].tolist()))
+        panels.append(Panel(layers, part, ("check points in their order", "z"), x=ends, names=[""] * len(rows)))
+    caption = (
+        "Differences at check points over their standard deviations: in plan the length in the metric of the "
+        "covariance, in height with its sign. 95 % lie inside the band when these standard deviations are right."
+    )
+    beyond = int((np.abs(sizes) > list(LIMITS.values())).any(axis=1).sum())
+    words = f"{counted(len(rows), 'check point')}, {beyond} outside the limits in plan or height."
+    return [chart("check", ("Check points against their precision", caption, words), panels)]
+
+
+# as the zones lie in the left photo, by rows: 3 and 4 on top, 1 and 2 on the base, 5 and 6 below
+ZONES = {3: "top left", 4: "top right", 1: "left centre", 2: "right centre", 5: "bottom left", 6: "bottom right"}
+MOST_POINTS = 2400  # of all zones that are drawn one by one
+SHARE_ON_AXIS = 0.995  # share of the parallaxes that the axis holds; those beyond stand at its end
+
+
+def _hint(ray: Document, right: str, size: float) -> str:
+    return f"point {ray['point']} of {ray['photo']} – {right}: {size:+.1f} µm"
+
+
+def parallax_pictures(document: Document) -> list[Picture]:
+    """Draw the y parallaxes; nothing where none are known."""
+    pairs = list(document["models"])
+    pair_of = {pair["left"]: (n, pair["right"]) for n, pair in enumerate(pairs, 1)}
+    left_out = document["rejected"].where(stage="relative", readmitted=False)
+    rows = [
+        (pair_of[ray["photo"]][0], ray["zone"], size, key == "q_um", _hint(ray, pair_of[ray["photo"]][1], size))
+        for rays, key in ((document["residuals"], "q_um"), (left_out, "parallax_um"))
+        for ray in rays
+        if (size := ray[key]) is not None and ray["zone"] in ZONES and ray["photo"] in pair_of
+    ]
+    if not rows:
+        return []
+    number, zones, size, used = (np.array(column) for column in list(zip(*rows, strict=True))[:4])
+    used, hints, strips = used.astype(bool), [row[4] for row in rows], [pair["strip"] for pair in pairs]
+    tested = np.abs(size[used] if used.any() else size)
+    limit = 1.05 * nice(max(float(np.quantile(tested, SHARE_ON_AXIS)), 1e-6))
+    borders = np.array([(n + 0.5, limit) for n in range(1, len(pairs)) if strips[n] != strips[n - 1]]).reshape(-1, 2)
+    at = np.column_stack([number, size])
+    panels = []
+    for zone, where in ZONES.items():
+        own, out = np.flatnonzero((zones == zone) & used), np.flatnonzero((zones == zone) & ~used)
+        layers: list[Layer] = [Segments(borders * (1.0, -1.0), borders, "soft thin dashed")]
+        if len(rows) <= MOST_POINTS:
+            layers.append(Marks(at[own], "new", "dot", [hints[n] for n in own], "point", 3.3))
+        layers.append(Marks(at[out], "failed open", "diamond", [hints[n] for n in out], "left out", 4.0))
+        title = f"zone {zone}, {where}"
+        if len(own):
+            there, of_pair = np.unique(number[own], return_inverse=True)
+            means = np.bincount(of_pair, size[own]) / np.bincount(of_pair)
+            layers.append(Line(np.column_stack([there, means]), "c1 thin", "mean of the pair"))
+            scatter = float(np.std(size[own], ddof=min(1, len(own) - 1)))
+            title += f": {size[own].mean():+.1f} ± {scatter / len(own) ** 0.5:.1f} µm, scatter {scatter:.1f}"
+        lefts = [pair["left"] for pair in pairs]
+        panels.append(Panel(layers, title, ("left photo of the pair", "µm"), y=(-limit, limit), names=lefts))
+    caption = (
+        "Residual y parallaxes in the six standard zones, laid out as in the left photo, pair after pair. Above each "
+        "zone the mean of all pairs and the scatter of one point: a mean off zero in all pairs alike tells of the "
+        "camera, not of the pairs."
+    )
+    beyond = int((np.abs(size) > limit)[used | (len(rows) <= MOST_POINTS)].sum())
+    if beyond:
+        caption += f" At the ends of the axis {counted(beyond, 'parallax', 'parallaxes')} beyond it."
+    if len(borders):
+        caption += " Upright lines part the strips."
+    worst = int(np.argmax(np.where(used, np.abs(size), -1.0)))
+    words = "y parallaxes by standard zone", caption, f"{counted(len(pairs), 'pair')}; the largest is {hints[worst]}."
+    return [chart("parallaxes", words, panels, columns=2, height=130.0)]

@@ -390,8 +390,8 @@ def _legend(layers: Iterable[Layer], heading: str) -> tuple[list[str], float]:
         drawn, y = [svg.text((MARGIN, y), heading, "title")], 44.0
     entries: dict[str, Layer] = {}
     for layer in layers:
-        entries.setdefault(layer.words, layer)
-    entries.pop("", None)
+        if layer.words and len(layer.at):
+            entries.setdefault(layer.words, layer)
     for words, layer in entries.items():
         wide = 44.0 + LETTER * len(words)
         if x + wide > WIDTH - 70.0 and x > LEFT:

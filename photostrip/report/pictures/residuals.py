@@ -84,7 +84,7 @@ class Vectors(NamedTuple):
         layers: list[Layer] = [Areas([box(*self.extent)], "open soft thin"), Segments(at, ends, "ink thin")]
         for chosen, kind, shape, words in ((used, "c1", "dot", ""), (~used, "failed open", "diamond", "left out")):
             own = np.flatnonzero(chosen).tolist()
-            layers += [Marks(at[own], kind, shape, [hints[n] for n in own], words, 3.0)] if len(own) else []
+            layers.append(Marks(at[own], kind, shape, [hints[n] for n in own], words, 3.0))
         return Map(layers, title, self.extent)
 
 

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from photostrip.notes import Document
-from photostrip.report.pictures.along import deformation_pictures, precision_pictures
-from photostrip.report.pictures.check import check_pictures
-from photostrip.report.pictures.footprints import footprint_pictures
-from photostrip.report.pictures.parallaxes import parallax_pictures
+from photostrip.report.pictures.along import check_pictures, deformation_pictures, parallax_pictures, precision_pictures
 from photostrip.report.pictures.places import plan_of
-from photostrip.report.pictures.plan import plan_picture, precision_maps
+from photostrip.report.pictures.plan import footprint_pictures, plan_picture, precision_maps, tie_pictures
 from photostrip.report.pictures.residuals import residual_pictures
 from photostrip.report.pictures.svg import Picture
-from photostrip.report.pictures.ties import tie_pictures
 
 SECTIONS = {
     "parallaxes": "relative",

@@ -6,11 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from heapq import nlargest
 from itertools import groupby
 from operator import itemgetter
-from typing import Any
 
 from photostrip.notes import Document, counted, listed
 from photostrip.report.page.parts import Column, Facts, Part, Table, Words
-from photostrip.report.page.tables import Field, fixed, keyed, metres, short, signed, tabulated, written
+from photostrip.report.page.tables import Field, Rows, fixed, keyed, metres, short, signed, tabulated, written
 from photostrip.report.sections.formation import GROUND_AXES, degrees
 
 ONE = {
@@ -168,7 +167,7 @@ def pixel_sizes(document: Document) -> dict[str, float]:
     return {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"] if camera["pixel_size_mm"]}
 
 
-def _calibration(rows: Any, pixels: dict[str, float]) -> Iterator[Table]:  # noqa: ANN401 (a table of a result)
+def _calibration(rows: Rows, pixels: dict[str, float]) -> Iterator[Table]:
     """Give the parameters of cameras, lengths also in pixels, and of each camera the correlations between them."""
     sizes = [
         short(row["value"] / pixels[row["camera"]]) if row["camera"] in pixels and row["unit"] == "mm" else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from heapq import nlargest
 from itertools import groupby
 from math import fabs, hypot
@@ -14,6 +14,7 @@ from photostrip.notes import Document, before, counted, listed
 from photostrip.report.page.parts import Facts, Part, Table, Words
 from photostrip.report.page.tables import (
     Field,
+    Rows,
     column_of,
     fields,
     fixed,
@@ -46,7 +47,7 @@ MEANING = (
 BASES = {"a-priori": "as stated", "a-posteriori": "found by the adjustment"}
 
 
-def _given(document: Document, role: str) -> Any:  # noqa: ANN401 (a table of a result)
+def _given(document: Document, role: str) -> Rows:
     """Return the given points of a role that have coordinates in the result."""
     return document["control"].where(role=role, measured=True)
 
@@ -63,37 +64,28 @@ def control(document: Document, most: int | None = None) -> Iterator[Part]:
     yield from _unused(document)
 
 
-def given_table(document: Document, given: Any, role: str, most: int | None) -> Table:  # noqa: ANN401
+def given_table(document: Document, given: Rows, role: str, most: int | None) -> Table:
     """Return the table of given points of a role with their differences, the worst first."""
     summary = document["summary"]
     shown, note = worst_first(given, "normalised", ("points", role, "control"), most)
     used = Field("use"), [_used(row) for row in shown]
     known = (size for size, out in zip(given.values("normalised"), given.values("rejected"), strict=True) if not out)
     plan, height = summary[role]["plan"], summary[role]["height"]
-    foot = (
-        {
-            "id": "rms",
-            **{key: metres(summary[f"{role}_rms"][axis]) for key, axis in zip(DIFFERENCES, AXES, strict=True)},
-            "plan_um": micrometres(plan["rms_um"]),
-            "height_um": micrometres(height["rms_um"]),
-            "normalised": fixed(summary[role]["normalised"], 2),
-        },
-        {"id": "mean"} | {key: signed(summary[f"{role}_mean"][key[1]]) for key in DIFFERENCES},
-        {
-            "id": "largest",
-            **_largest(document, given),
-            "plan_um": micrometres(plan["max_um"]),
-            "height_um": micrometres(height["max_um"]),
-            "normalised": fixed(max((each for each in known if each is not None), default=None), 2),
-        },
+    over = max((each for each in known if each is not None), default=None)
+    rms, mean, most_of_all = _sums(
+        document, given, *({key: summary[f"{role}_{of}"][key[1]] for key in DIFFERENCES} for of in ("rms", "mean"))
     )
+    rms |= {"plan_um": micrometres(plan["rms_um"]), "height_um": micrometres(height["rms_um"])}
+    rms |= {"normalised": fixed(summary[role]["normalised"], 2)}
+    most_of_all |= {"plan_um": micrometres(plan["max_um"]), "height_um": micrometres(height["max_um"])}
+    most_of_all |= {"normalised": fixed(over, 2)}
     other = "the adjustment" if "bundle" in document else "a model point"
     below = (
         f"plan, height: at {scale_word(document)} scale; ratio: to the combined standard deviation of the given point "
         f"and of {other}"
     )
     keys = "id used dx dy dz plan_um height_um normalised:1 sigma_1:2 sigma_2:2 sigma_3:2 strips:3"
-    return keyed(shown, keys, note_of(note, below), foot=foot, used=used)
+    return keyed(shown, keys, note_of(note, below), foot=(rms, mean, most_of_all), used=used)
 
 
 def _used(row: Document) -> str:
@@ -104,14 +96,20 @@ def _used(row: Document) -> str:
     return f"{kept} -{row['rejected']}".strip()
 
 
-def _largest(document: Document, rows: Sequence[Document]) -> dict[str, str]:
-    """Return the largest difference along each axis of those that were not rejected."""
-    found = {}
+def _sums(
+    document: Document, rows: Sequence[Document], rms: dict[str, float | None], mean: dict[str, float | None]
+) -> list[dict[str, str]]:
+    """Return the lines below differences: rms, mean, and the largest along each axis of those not rejected."""
+    largest = {}
     for axis, key in zip(document["frame"]["axes"], DIFFERENCES, strict=True):
         letter = LETTERS.get(axis, axis)
         sizes = (row[key] for row in rows if letter not in row.get("rejected", "") and row[key] is not None)
-        found[key] = signed(max(sizes, key=fabs, default=None))
-    return found
+        largest[key] = signed(max(sizes, key=fabs, default=None))
+    return [
+        {"id": "rms"} | {key: metres(value) for key, value in rms.items()},
+        {"id": "mean"} | {key: signed(value) for key, value in mean.items()},
+        {"id": "largest"} | largest,
+    ]
 
 
 def _unused(document: Document) -> Iterator[Part]:
@@ -183,11 +181,11 @@ def _chance(row: Document) -> float:
 def _unseen(
     document: Document,
     rows: Sequence[Document],
-    shown: Any,  # noqa: ANN401 (a table of a result, or dictionaries)
+    shown: Rows,
     seen: dict[str, tuple[float | None, Document]],
     more: str,
     note: str,
-    quantities: Any,  # noqa: ANN401 (descriptions)
+    quantities: Mapping[str, Any],
 ) -> Table:
     """Return the table of points that the adjustment has not seen.
 
@@ -196,18 +194,13 @@ def _unseen(
     more: further columns.
     """
     values = {key: [value for row in rows if (value := row[key]) is not None] for key in DIFFERENCES}
-    foot = (
-        {"id": "rms"}
-        | {key: metres(_rms(own)) for key, own in values.items()}
-        | {key: fixed(ratio, 2) for key, (ratio, _) in seen.items()},
-        {"id": "mean"} | {key: signed(sum(own) / len(own) if own else None) for key, own in values.items()},
-        {"id": "largest"} | _largest(document, rows),
-        {"id": "in 95 %"}
-        | {key: f"{part['inside_95']} of {part['count']}" for key, (_, part) in seen.items() if part["count"]},
-    )
+    means = {key: sum(own) / len(own) if own else None for key, own in values.items()}
+    rms, *others = _sums(document, rows, {key: _rms(own) for key, own in values.items()}, means)
+    rms |= {key: fixed(ratio, 2) for key, (ratio, _) in seen.items()}
+    inside = {key: f"{part['inside_95']} of {part['count']}" for key, (_, part) in seen.items() if part["count"]}
     plan, height = seen
     keys = f"id dx dy dz sigma_x:1 sigma_y:1 sigma_z:1 {plan} p_plan {height} p_height {more}"
-    return keyed(shown, keys, note, foot=foot, quantities=quantities)
+    return keyed(shown, keys, note, foot=(rms, *others, {"id": "in 95 %"} | inside), quantities=quantities)
 
 
 def _rms(values: Sequence[float]) -> float | None:
@@ -311,7 +304,7 @@ def _check(check: Document | None) -> Iterator[tuple[str, str]]:
         yield "all together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}", text
 
 
-def _least_precise(points: Any) -> Table:  # noqa: ANN401 (a table of a result)
+def _least_precise(points: Rows) -> Table:
     """Points with the largest error ellipse, and with the largest standard deviation in height."""
     places = largest_of(points, "ellipse_a", WORST_POINTS // 2)
     by_height = [place for place in largest_of(points, "sigma_z", WORST_POINTS) if place not in places]
@@ -390,7 +383,7 @@ def rejected(document: Document) -> Iterator[Part]:
     yield keyed(rows, keys) if len(rows) else Words("Nothing was rejected.")
 
 
-def standing_rejections(document: Document) -> Any:  # noqa: ANN401 (a table of a result)
+def standing_rejections(document: Document) -> Rows:
     """Return the measurements that were rejected and not taken back."""
     return document["rejected"].where(readmitted=False)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -29,15 +29,46 @@ cameras:
 """
 
 
-def test_keys_that_are_set_and_a_file_say_the_same(answer: Answer, tmp_path: Path) -> None:
+def planned(answer: Answer, kind: str, *arguments: object) -> Any:  # noqa: ANN401 (JSON)
+    """Give a plan as JSON; what has an equals sign in it is a key that is set."""
+    given = (f"--set={each}" if "=" in str(each) and str(each)[0] != "/" else each for each in arguments)
+    return json.loads(answer("plan", kind, *given, "--format", "json"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "keys", "text"),
+    [
+        (
+            "model",
+            ["camera={principal_distance: 100, format: [180, 160]}", "end_lap_percent=65", "control.layout=six"],
+            "camera: {principal_distance: 100, format: [180, 160]}\nend_lap_percent: 65\ncontrol: {layout: six}\n",
+        ),
+        (
+            "strip",
+            ["models=5", "layouts=[bands=2, corners]", "methods=[similarity, degree 2]"],
+            "models: 5\nlayouts: {2 bands: bands=2, corners: {layout: corners}}\nmethods: [similarity, degree 2]\n",
+        ),
+        (
+            "displacement",
+            ["camera=UMK 10/1318", "base=30", "distances=[50, 120]", "sigma_um=4"],
+            "camera: UMK 10/1318\nbase: 30\ndistances: [50, 120]\nsigma_d_um: 5.656854249492381\n",
+        ),
+        ("screening", ["methods=[tau, auto]", "repetitions=1"], "methods: [tau, auto]\nrepetitions: 1\n"),
+    ],
+)
+def test_keys_that_are_set_and_a_file_say_the_same(
+    kind: str, keys: list[str], text: str, answer: Answer, tmp_path: Path
+) -> None:
+    file = tmp_path / "plan.yaml"
+    file.write_text(f"photostrip_plan_{kind}: 1\n{text}")
+    assert planned(answer, kind, file) == planned(answer, kind, *keys)
+
+
+def test_a_model_has_the_numbers_of_the_function(answer: Answer) -> None:
     keys = ["camera={principal_distance: 100, format: [180, 160]}", "end_lap_percent=65", "flying_height=800"]
     keys += ["image_sigma_um=3", "control={layout: six, sigma: [0.02, 0.03, 0.04]}"]
-    from_keys = answer("plan", "model", *(f"--set={key}" for key in keys), "--format", "json")
-    file = tmp_path / "m.yaml"
-    file.write_text("\n".join(["photostrip_plan_model: 1", *(key.replace("=", ": ") for key in keys)]))
-    assert answer("plan", "model", str(file), "--format", "json") == from_keys
-    found = json.loads(from_keys)
-    b, a = 63.0, 64.0
+    found, b, a = planned(answer, "model", *keys), 63.0, 64.0
     spec = ModelSpec(100, b, a, 8000, 0.003, control=control_layout("six", b, a), control_sigma=(0.02, 0.03, 0.04))
     expected = plan_model(spec)
     assert [point["sigma_z_m"] for point in found["points"]] == pytest.approx(expected.sigmas[:, 2], abs=1e-5)
@@ -45,7 +76,7 @@ def test_keys_that_are_set_and_a_file_say_the_same(answer: Answer, tmp_path: Pat
 
 
 def test_sources_add_up_and_the_table_is_the_document(answer: Answer) -> None:
-    document = json.loads(answer("plan", "model", "--format", "json"))
+    document = planned(answer, "model")
     share = {row["source"]: row for row in document["sources"]}
     parts = ("measuring of the point", "orientation, together", "control, measured", "control, given")
     for name in ("plan_rms_m", "z_rms_m"):
@@ -69,7 +100,7 @@ def test_more_points_in_a_zone_lower_what_the_elements_do(answer: Answer) -> Non
 def test_cameras_from_a_list(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text(CAMERAS)
-    document = json.loads(answer("plan", "camera", str(file), "--format", "json"))
+    document = planned(answer, "camera", file)
     wide, digital = document["cameras"]
     assert (document["reference"], document["fewest_photos"], document["smallest_coefficient"]) == (
         "digital",
@@ -110,7 +141,7 @@ def test_a_wrong_list_of_cameras_is_refused(text: str, message: str, call: Call,
 def test_cameras_over_ground(answer: Answer, call: Call, tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text(CAMERAS + "side_lap_percent: 30\nheight_sigma: 0.2\nrelief: 400\nslope_deg: 60\n")
-    document = json.loads(answer("plan", "camera", str(file), "--format", "json"))
+    document = planned(answer, "camera", file)
     assert [row["useful_width_mm"] for row in document["cameras"]] == pytest.approx([161, 72.702])
     assert document["models"][0]["base_ratio"] == pytest.approx(153 / 92, abs=1e-4)
     for row in nonempty(document["survey"]):
@@ -152,7 +183,7 @@ element_errors: {dby_um: 4, dbz_um: -3, dkappa_arcsec: 6, dalpha_arcsec: -4, dom
 def test_given_errors_come_out_as_errors_of_points(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "m.yaml"
     file.write_text(GIVEN)
-    document = json.loads(answer("plan", "model", str(file), "--format", "json"))
+    document = planned(answer, "model", file)
     parts: dict[str, dict[str, list[float]]] = {}
     for row in nonempty(document["errors"]):
         parts.setdefault(row["point"], {})[row["part"]] = [row[f"error_{axis}_m"] for axis in "xyz"]
@@ -180,7 +211,7 @@ def test_misclosures_come_out_as_corrections(answer: Answer, tmp_path: Path) -> 
     file = tmp_path / "m.yaml"
     points = "".join(f"    - {{at: [{x}, {y}], misclosure: [0.1, -0.2, 0.3]}}\n" for x in (0, 90) for y in (-80, 80))
     file.write_text(f"photostrip_plan_model: 1\ncontrol:\n  points:\n{points}points: [{{name: A, at: [20, 30]}}]\n")
-    given = json.loads(answer("plan", "model", str(file), "--format", "json"))
+    given = planned(answer, "model", file)
     assert "errors" not in given
     # a shift of the whole control is a shift of the model, and no sign of wrong elements
     wanted = [0.1, -0.2, 0.3]
@@ -273,23 +304,6 @@ place: {points: 1, into: ends, method: similarity}
 """
 
 
-def test_a_strip_from_keys_and_from_a_file(answer: Answer, tmp_path: Path) -> None:
-    keys = ["models=5", "layouts=[bands=2, corners]", "methods=[similarity, degree 2]", "points.rows=3"]
-    keys += ["required=[0.4, 0.5]", "control_sigma=[0.02, 0.02, 0.03]"]
-    from_keys = answer("plan", "strip", *(f"--set={key}" for key in keys), "--format", "json")
-    file = tmp_path / "s.yaml"
-    file.write_text(
-        'photostrip_plan_strip: 1\nmodels: 5\nlayouts: {"2 bands": {bands: 2}, corners: {layout: corners}}\n'
-        "methods: [similarity, degree 2]\npoints: {rows: 3}\nrequired: {plan: 0.4, height: 0.5}\n"
-        "control_sigma: [0.02, 0.02, 0.03]\n"
-    )
-    assert answer("plan", "strip", str(file), "--format", "json") == from_keys
-    document = json.loads(from_keys)
-    assert [row["layout"] for row in document["accuracy"]] == ["2 bands", "2 bands", "corners", "corners"]
-    assert len(document["along"]) == 4 * 6
-    assert {row["method"] for row in document["needed"]} == {"similarity", "degree 2"}
-
-
 @pytest.mark.slow
 def test_the_report_of_a_strip(answer: Answer, tmp_path: Path) -> None:
     file = tmp_path / "s.yaml"
@@ -297,7 +311,7 @@ def test_the_report_of_a_strip(answer: Answer, tmp_path: Path) -> None:
     text = answer("plan", "strip", str(file))
     for words in ("ends", "0.050 0.050 0.080, offset free", "3/2 xy", "0.500 m in height", "Best places", "never"):
         assert words in text
-    document = json.loads(answer("plan", "strip", str(file), "--format", "json"))
+    document = planned(answer, "strip", file)
     by = {(row["layout"], row["method"]): row for row in document["accuracy"]}
     assert ("gnss", "similarity") not in by  # only the bundle uses perspective centres
     assert by["gnss", "bundle"]["worst_z_m"] < by["ends", "bundle"]["worst_z_m"]
@@ -324,7 +338,7 @@ def test_all_faults_of_a_strip_are_told_where_they_stand(call: Call, tmp_path: P
 
 def test_every_layout_with_and_without_perspective_centres(answer: Answer) -> None:
     keys = ("models=8", "layouts=[corners]", "methods=[similarity, bundle]", "gnss=[0.05, 0.05, 0.08]")
-    document = json.loads(answer("plan", "strip", *(f"--set={key}" for key in keys), "--format", "json"))
+    document = planned(answer, "strip", *keys)
     rows = {(row["layout"], row["method"]): row["worst_z_m"] for row in document["accuracy"]}
     assert list(rows) == [("corners", "similarity"), ("corners", "bundle"), ("corners + GNSS", "bundle")]
     assert rows["corners + GNSS", "bundle"] < 0.5 * rows["corners", "bundle"]
@@ -375,43 +389,20 @@ def test_the_picture_of_a_strip(answer: Answer, call: Call, tmp_path: Path) -> N
 # -------------------------------------------------------------------------------------------------- displacements
 
 
-@pytest.mark.slow
-def test_displacements_from_keys_and_from_a_file(answer: Answer, tmp_path: Path) -> None:
-    options = ("--set=camera=UMK 10/1318", "--set=base=30", "--set=distances=[50, 120]", "--set=sigma_um=4")
-    from_options = answer("plan", "displacement", *options, "--format", "json")
-    file = tmp_path / "d.yaml"
-    file.write_text(
-        "photostrip_plan_displacement: 1\nbase: 30\ndistances: [50, 120]\nsigma_d_um: 5.656854249492381\n"
-        "camera: UMK 10/1318\n"
-    )
-    assert answer("plan", "displacement", str(file), "--format", "json") == from_options
-    document = json.loads(from_options)
+def test_displacements_from_one_station_and_from_two(answer: Answer) -> None:
+    document = planned(answer, "displacement", "camera=UMK 10/1318", "base=30", "distances=[50, 120]", "sigma_um=4")
     assert [row["distance_m"] for row in document["points"]] == [50, 50, 50, 120, 120, 120]
     assert document["points"][0]["sigma_y_m"] == pytest.approx(50**2 / (30 * 100) * 0.008, abs=1e-6)
-    text = answer("plan", "displacement", options[0], "--set=stations=1")
+    text = answer("plan", "displacement", "--set=camera=UMK 10/1318", "--set=stations=1")
     assert "one, distances known" in text
 
 
-# ------------------------------------------------------------------------------------------------------- screening
-
-
 @pytest.mark.slow
-def test_screening_from_keys_and_from_a_file(answer: Answer, tmp_path: Path) -> None:
+def test_screening_counts_what_is_put_in(answer: Answer) -> None:
     keys = ("zone_points=[3, 3, 3, 3, 3, 3]", "error_sizes_um=[50, 100]", "methods=[tau, auto]", "repetitions=1")
-    options = [f"--set={key}" for key in keys]
-    from_options = answer("plan", "screening", *options, "--format", "json")
-    file = tmp_path / "s.yaml"
-    file.write_text(
-        "photostrip_plan_screening: 1\nzone_points: [3, 3, 3, 3, 3, 3]\nerror_sizes_um: [50, 100]\n"
-        "methods: [tau, auto]\nrepetitions: 1\n"
-    )
-    assert answer("plan", "screening", str(file), "--format", "json") == from_options
-    document = json.loads(from_options)
+    document = planned(answer, "screening", *keys)
     assert [each["method"] for each in document["methods"]] == ["tau", "auto"]
-    rows = list(csv.DictReader(io.StringIO(answer("plan", "screening", str(file), "--format", "csv"))))
-    assert len(rows) == 2 * 6 * 2
-    assert sum(int(row["errors"]) for row in rows) == 2 * 44
+    assert len(document["detection"]) == 2 * 6 * 2
+    assert sum(row["errors"] for row in document["detection"]) == 2 * 44
     first = document["effects"][0]
     assert first["largest_100_um_arcmin"] == pytest.approx(2 * first["largest_50_um_arcmin"], abs=0.02)
-    text = answer("plan", "screening", str(file))
-    assert "What one undetected error does to the elements, minutes of arc" in text

@@ -1,13 +1,35 @@
-"""Pages of any width: nothing wider than the page, nothing lost that should be there, the same words everywhere."""
+"""Pages of any width and the terminal: nothing wider, nothing lost, the same words; colours where they are wanted."""
 
 from __future__ import annotations
+
+import io
+import os
+import re
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.report.page.layout import NARROWEST, WIDEST_PAGE, cells, clamp, cut, lay_out, pad, plain_ascii, wrapped
+from photostrip.report.page.layout import (
+    NARROWEST,
+    WIDEST_PAGE,
+    cells,
+    clamp,
+    has_colours,
+    lay_out,
+    page_width,
+    plain_ascii,
+    print_report,
+    speaks_unicode,
+    to_text,
+    wrapped,
+)
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
+from photostrip.report.sections.accuracy_report import sections_of, title_of
+from tests.reports import saved
+from tests.source_tree import ROOT
 
 WORDS = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=90)
 NUMBERS = st.floats(-1e6, 1e6).map(lambda value: f"{value:.3f}")
@@ -80,19 +102,6 @@ def test_cells_of_letters(text: str, width: int) -> None:
     assert cells(text) == width
 
 
-def test_cutting_leaves_room_for_the_dots() -> None:
-    assert cut("abcdefgh", 8, "…") == "abcdefgh"
-    assert cut("abcdefgh", 5, "…") == "abcd…"
-    assert cut("abcdefgh", 5, "...") == "ab..."
-    assert cut("点点点", 5, "…") == "点点…"
-    assert pad("点", 4, left=True) == "点  "
-    assert pad("1", 3, left=False) == "  1"
-
-
-def test_widths_have_limits() -> None:
-    assert [clamp(width) for width in (0, 60, 100, 999)] == [NARROWEST, 60, 100, WIDEST_PAGE]
-
-
 def lines(table: Table, width: int) -> list[str]:
     return [line.text for line in lay_out("", [Section("", (table,))], width)]
 
@@ -125,3 +134,73 @@ def test_ascii_keeps_ids_and_writes_the_rest_plainly() -> None:
     text = plain_ascii("σ0 4.8 µm – точка … α ω κ ± 2°")
     assert text == "sigma0 4.8 um - точка ... alpha omega kappa +- 2deg"
     assert plain_ascii("1001 – 1002") == "1001 - 1002"
+
+
+ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def shown(stream: io.StringIO, width: int | None = 100, *, colour: bool | None = None) -> str:
+    print_report(title_of(saved()), sections_of(saved()), stream, width, colour=colour)
+    return stream.getvalue()
+
+
+def plain(width: int = 100) -> str:
+    return to_text(title_of(saved()), sections_of(saved()), width)
+
+
+def test_a_pipe_gets_the_plain_text() -> None:
+    assert shown(io.StringIO()) == plain()
+
+
+@pytest.mark.parametrize("width", [60, 100, 200])
+def test_colours_change_nothing_but_colours(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR")
+    monkeypatch.setenv("TERM", "xterm-256color")
+    text = shown(Terminal(), width)
+    assert "\x1b[1;31m" in text
+    assert ESCAPE.sub("", text) == plain(width)
+
+
+def test_when_there_are_colours() -> None:
+    assert has_colours(Terminal(), {})
+    assert has_colours(Terminal(), {"NO_COLOR": ""})
+    assert not has_colours(Terminal(), {"NO_COLOR": "0"})
+    assert not has_colours(Terminal(), {"TERM": "dumb"})
+    assert not has_colours(io.StringIO(), {"TERM": "xterm"})
+
+
+@pytest.mark.parametrize(
+    ("encoding", "unicode"), [("utf-8", True), ("UTF8", True), ("ascii", False), ("cp1252", False), ("latin-1", False)]
+)
+def test_other_encodings_get_ascii(encoding: str, *, unicode: bool) -> None:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    assert speaks_unicode(stream) is unicode
+    print_report(title_of(saved()), sections_of(saved()), stream, 80)
+    stream.seek(0)
+    text = stream.read()
+    assert text == to_text(title_of(saved()), sections_of(saved()), 80, ascii_only=not unicode)
+    assert text.isascii() is not unicode
+
+
+@pytest.mark.parametrize(("columns", "width"), [("80", 80), ("20", 60), ("500", 200), ("", 100), ("x", 100)])
+def test_the_width_is_that_of_the_terminal(columns: str, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    monkeypatch.setattr(os, "get_terminal_size", lambda *_: (_ for _ in ()).throw(OSError))
+    assert page_width() == width
+
+
+@pytest.mark.slow
+def test_rich_is_not_loaded_for_a_pipe() -> None:
+    code = (
+        "import sys\nfrom tests.reports import *\nfrom photostrip.report.page.layout import print_report\n"
+        "print_report('', sections_of(saved()), sys.stdout)\n"
+        "sys.exit('rich' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True)

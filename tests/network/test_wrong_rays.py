@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
+
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
 SIGMA = 5 * MICROMETRE

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.network.problem import BundleProblem
 
+
 BLOCK = Spec(flight=Flight(photos=6), points=Points(extra_per_model=8))
 
 

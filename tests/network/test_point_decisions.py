@@ -20,6 +20,7 @@ from tests.loops import nonempty
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
+
 SIGMA = 0.005  # mm
 ALPHA = 0.01
 
