@@ -27,7 +27,7 @@ from photostrip.plausibility import KINDS
 from photostrip.plausibility.finding import CAUSES
 from photostrip.project.editors import KINDS as FILES
 from photostrip.project.editors import keys_page
-from photostrip.result.schema import result_page
+from photostrip.result.description import result_page
 from tests.renew_notebooks import page as notebook_page
 
 if TYPE_CHECKING:

@@ -137,7 +137,7 @@ def schema(
     """
     from photostrip.formats.files import write_text
     from photostrip.project.editors import keys_page, schema_of
-    from photostrip.result.schema import result_page, result_schema
+    from photostrip.result.description import result_page, result_schema
 
     asked: dict[str, object] = {"tolerances": tolerances, "simulation": simulation, plan or "": plan}
     asked |= {f"terrestrial {terrestrial}": terrestrial, f"step {step}": step}

@@ -17,7 +17,7 @@ from photostrip.notes import Document, Note, counted
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.results import ROLES, Bundle, Result, StripResult
-from photostrip.points import locate
+from photostrip.points import PhotoPoints, locate
 from photostrip.rejection import UNCONTROLLED
 from photostrip.result.given import size_columns
 from photostrip.result.numbers import (
@@ -35,7 +35,7 @@ from photostrip.result.numbers import (
 )
 from photostrip.result.precision import CORRELATIONS, SIGMAS, centre_columns, photo_columns, point_columns
 from photostrip.result.table import Table
-from photostrip.strip.resection import depths, project
+from photostrip.strip.resection import KnownPhotos, depths, project
 from photostrip.units import MICROMETRES
 
 CHECKED = NONE, ACROSS, ALONG = "none", "across", "along"
@@ -224,51 +224,39 @@ def image_residuals(result: Result, rank: Numbers) -> list[ImageResiduals]:
     Photos that are strips of their own are known to a bundle adjustment only. `rank` is the place of each point in
     natural order.
     """
-    return [_of_strip(result, strip, rank) for strip in result.photo_strips] + _of_singles(result, rank)
+    observations, found = result.refined.observations, []
+    for strip in result.photo_strips:
+        photos = strip.of_photos.strip.oriented(strip.resection.centers, strip.resection.rotations)
+        known = _known(observations, strip.formed.point, strip.xyz, strip.rows)
+        found.append(_residuals(observations, strip.of_photos.strip, photos, known, rank))
+    if result.bundle is None or not result.bundle.singles:
+        return found
+    rows = result.bundle.block.rows[result.bundle.screened.selection.images]
+    known = _known(observations, result.points.number, result.points.cartesian, rows)
+    for each in result.bundle.singles:
+        photos = each.strip.oriented(each.center[None], each.rotation[None])
+        found.append(_residuals(observations, each.strip, photos, known, rank))
+    return found
 
 
-def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:
-    observations, flown = result.refined.observations, strip.of_photos.strip
-    position = flown.positions(observations)
+def _known(observations: PhotoPoints, number: Numbers, xyz: Floats, rows: Numbers) -> tuple[Floats, Flags]:
+    """Return the places of all points, and which measurements took part: those in some rows."""
+    places, used = np.full((len(observations.point_ids), 3), np.nan), np.zeros(len(observations), bool)
+    places[number], used[rows] = xyz, True
+    return places, used
+
+
+def _residuals(
+    observations: PhotoPoints, strip: Strip, photos: KnownPhotos, known: tuple[Floats, Flags], rank: Numbers
+) -> ImageResiduals:
+    position, (places, used) = strip.positions(observations), known
     rows = np.flatnonzero(position >= 0)
     rows = rows[order_of(position[rows], rank[observations.point[rows]])]
-    known = np.full((len(observations.point_ids), 3), np.nan)
-    known[strip.formed.point] = strip.xyz
-    used = np.zeros(len(observations), bool)
-    used[strip.rows] = True
-    places = known[observations.point[rows]]
-    photos = flown.oriented(strip.resection.centers, strip.resection.rotations)
+    photo, point = position[rows], observations.point[rows]
     with np.errstate(invalid="ignore"):
-        residuals = observations.xy[rows] - project(places, photos, position[rows])
-        depth = depths(known, observations.point[rows], photos.centers, photos.rotations, position[rows])
-    return ImageResiduals(
-        strip=flown, rows=rows, photo=position[rows], residuals=residuals, depth=depth, used=used[rows]
-    )
-
-
-def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
-    if result.bundle is None or not result.bundle.singles:
-        return []
-    observations = result.refined.observations
-    known = np.full((len(observations.point_ids), 3), np.nan)
-    known[result.points.number] = result.points.cartesian
-    used = np.zeros(len(observations), bool)
-    used[result.bundle.block.rows[result.bundle.screened.selection.images]] = True
-    found = []
-    for single in result.bundle.singles:
-        rows = np.flatnonzero(observations.photo == observations.photo_ids.index(single.strip.photos[0]))
-        rows = rows[np.argsort(rank[observations.point[rows]], kind="stable")]
-        photo, point = np.zeros(len(rows), np.intp), observations.point[rows]
-        photos = single.strip.oriented(single.center[None], single.rotation[None])
-        with np.errstate(invalid="ignore"):
-            residuals = observations.xy[rows] - project(known[point], photos, photo)
-            depth = depths(known, point, photos.centers, photos.rotations, photo)
-        found.append(
-            ImageResiduals(
-                strip=single.strip, rows=rows, photo=photo, residuals=residuals, depth=depth, used=used[rows]
-            )
-        )
-    return found
+        residuals = observations.xy[rows] - project(places[point], photos, photo)
+        depth = depths(places, point, photos.centers, photos.rotations, photo)
+    return ImageResiduals(strip=strip, rows=rows, photo=photo, residuals=residuals, depth=depth, used=used[rows])
 
 
 def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Table:

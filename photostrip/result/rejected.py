@@ -15,6 +15,7 @@ from photostrip.pipeline.results import Bundle, Result, StripResult
 from photostrip.points import PhotoPoints
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.bundle import GroupKind, kinds, names_of_observation
+from photostrip.result.description import block_at
 from photostrip.result.numbers import DECIMALS_BY_UNIT, Plain, natural, natural_rank, rounded
 from photostrip.result.points import ImageResiduals
 from photostrip.result.strips import PPM, names_of
@@ -34,22 +35,11 @@ REASONS_OF_MODELS = {
     SEVERAL_RAYS: "the models contradict each other at the point, and it cannot be told which is wrong: none counts",
 }
 EMPTY: Document = {
-    "strip": "",
-    "photo": None,
-    "other_photo": None,
-    "point": None,
-    "stage": "",
-    "test": "",
-    "value": None,
-    "limit": None,
-    "unit": "",
-    "parallax_um": None,
-    "zone": None,
-    "size": None,
+    **{key: None for key, entry in block_at("rejected").items() if not entry.optional},
+    **dict.fromkeys(("strip", "stage", "test", "unit", "reason"), ""),
     "size_unit": "um",
     "readmitted": False,
     "blamed": [],
-    "reason": "",
 }
 
 

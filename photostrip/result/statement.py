@@ -16,7 +16,7 @@ from photostrip.notes import Document, listed
 from photostrip.pipeline.results import Result
 from photostrip.result.certificate import EDITED, is_edited
 from photostrip.result.given import Differences
-from photostrip.result.numbers import record, rms
+from photostrip.result.numbers import mean, record, rms
 from photostrip.result.table import Table
 from photostrip.result.verdict import FAILED, UNVERIFIED
 
@@ -44,7 +44,7 @@ def figures_of(differences: Floats, sigma: Floats) -> Document:
     level = np.where(np.isnan(plan)[:, None], np.nan, differences[:, :2])
     columns = (*level.T, differences[:, 2])
     axes = {
-        axis: {"rmse": rms(column), "mean": _mean(column)}
+        axis: {"rmse": rms(column), "mean": mean(column)}
         for axis, column in zip(("east", "north", "up"), columns, strict=True)
     }
     both = hypot(*(part["accuracy"] for part in parts.values()))
@@ -68,15 +68,10 @@ def _part(size: Floats, sigma: Floats) -> Document:
         "survey": survey,
         "accuracy": hypot(rmse, survey),
         "class_cm": class_of(hypot(rmse, survey)),
-        "mean": _mean(size),
+        "mean": mean(size),
         "p90": float(size[len(size) // SHARE_BEYOND]) if len(size) else float("nan"),
         "largest": float(size[0]) if len(size) else float("nan"),
     }
-
-
-def _mean(values: Floats) -> float:
-    known = values[~np.isnan(values)]
-    return float(known.mean()) if len(known) else float("nan")
 
 
 def _circle(east: float, north: float) -> Document:

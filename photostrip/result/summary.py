@@ -16,7 +16,7 @@ from photostrip.pipeline.results import NEW, ROLES, Result
 from photostrip.result import strips
 from photostrip.result.bundle import image_fit
 from photostrip.result.given import Differences, of_used
-from photostrip.result.numbers import Plain, record, rms
+from photostrip.result.numbers import Plain, mean, record, rms
 from photostrip.result.points import ImageResiduals, ground_sample_distance
 from photostrip.result.rejected import rejected_by_strip
 from photostrip.result.strips import Parallaxes, sigma0_of_pairs
@@ -254,7 +254,7 @@ def summary_of(result: Result, images: Sequence[ImageResiduals], found: Differen
     for role, rows in roles.items():
         values[f"{role}_rms"] = _by_axis(rms, found.axes[rows])
         values[f"{role}_rms_um"] = _by_axis(rms, found.axes[rows] / found.scale[rows, None] * 1e6)
-        values[f"{role}_mean"] = _by_axis(_mean, found.axes[rows])
+        values[f"{role}_mean"] = _by_axis(mean, found.axes[rows])
     for role, rows in roles.items():
         values[role] = _role(result, found, rows)
     return record("summary", values)
@@ -324,12 +324,6 @@ def _mean_of_strips(result: Result, values: list[float]) -> float:
 
 def _by_axis(sum_up: Callable[[Floats], float], values: Floats) -> Document:
     return {axis: sum_up(column) for axis, column in zip("xyz", values.T, strict=True)}
-
-
-def _mean(values: Floats) -> float:
-    """Mean of what is not NaN; NaN when there is nothing."""
-    known = ~np.isnan(values)
-    return float(np.where(known, values, 0.0).sum() / known.sum()) if known.any() else float("nan")
 
 
 def _role(result: Result, found: Differences, rows: Flags) -> Document:

@@ -49,7 +49,7 @@ def two_strips(folder: Path) -> None:
     for name in ("a", "b"):
         write_project(folder / name, spec(), "extends: ../common.yaml\n")
     project = folder / "b/project.yaml"
-    text = project.read_text(encoding="utf-8").replace('"EPSG:32633"', f"{GEOID}\n    height: orthometric")
+    text = project.read_text(encoding="utf-8").replace('"EPSG:32633"', f"{GEOID}\n  height: orthometric")
     project.write_text(text, encoding="utf-8")
     write_gtx(folder / "b/own.gtx", np.full((41, 41), 45.0), south=30.0, west=0.0, step=1.0)
 

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
+from scipy.spatial.transform import Rotation
 
 from photostrip import comparison
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances, baseline_of
@@ -194,11 +195,7 @@ def test_feet_are_told_in_metres() -> None:
 )
 def test_a_rotation_is_told_by_its_angle(angle: float, axis: tuple[float, float, float]) -> None:
     now, before = documents()
-    x, y, z = np.array(axis) / math.hypot(*axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # Rodrigues, with sin and 1 - cos of the angle
-    turn = np.eye(3) + math.sin(math.radians(angle)) * cross
-    turn += 2 * math.sin(math.radians(angle) / 2) ** 2 * cross @ cross
+    turn = Rotation.from_rotvec(np.array(axis) / math.hypot(*axis) * angle, degrees=True).as_matrix()
     photo = now["photos"][2]
     photo.update(zip(MATRIX, (turn @ rotation(photo)).ravel().tolist(), strict=True))
     found = kind(compare_results(now, before), "rotation")["worst"]

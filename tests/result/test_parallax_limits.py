@@ -13,7 +13,6 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.result import pictures_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
-from photostrip.strip.pair_screening import GlobalTest
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
 from tests.simulated import inputs_of
@@ -51,18 +50,6 @@ def test_what_was_used_lies_within_the_limits_and_what_was_rejected_beyond(scree
     wrong = [row for row in document["rejected"] if row["stage"] == "relative" and not row["readmitted"]]
     for row in nonempty(wrong):
         assert abs(row["parallax_um"]) > size[row["photo"], row["other_photo"]]
-
-
-def test_the_limit_of_a_search_is_that_of_its_global_test() -> None:
-    """A point of median redundancy has the limit as its standardised residual."""
-    one = case()
-    stages = one.result.photo_strips[0].of_photos
-    oriented, test = stages.screened.orientation, GlobalTest.of(stages.screened.scatter.by_pair)
-    for pair, limit in enumerate(nonempty(limits(one.document))):
-        rows = np.flatnonzero((oriented.pairs.pair == pair) & oriented.used)
-        share = np.median(np.sqrt(oriented.redundancy[rows] / oriented.pairs.weight[rows]))
-        bound = test.largest_limits(oriented.points_used)[pair]
-        assert limit == pytest.approx(1000.0 * bound * test.sigma[pair] * share, rel=0.02)
 
 
 def test_without_a_search_there_is_no_limit() -> None:

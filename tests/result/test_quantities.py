@@ -16,7 +16,6 @@ from photostrip.result.description import LEFT_OUT, Block, Quantity, described
 from photostrip.result.numbers import rounded_as
 from photostrip.result.table import Table, plain_of
 from photostrip.simulation import Models, simulate
-from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
 from tests.results import case, solved, spec
 from tests.simulated import inputs_of
@@ -114,15 +113,6 @@ def test_the_page_names_keys_that_there_are() -> None:
     named = set(re.findall(r"`(\w+)(?:\.\w+)?`", table))
     assert len(named) > 30
     assert named <= {name for path in KEYS for name in path.split(".")}
-
-
-def test_ratios_of_given_points_have_two_decimals() -> None:
-    """That of one point, those of the summary that are compared with a limit of 5."""
-    document = case("local").document
-    ratios = [row["normalised"] for row in document["control"] if row["normalised"] is not None]
-    summary = [document["summary"][role]["normalised"] for role in ("control", "check")]
-    for values in (ratios, [each for each in summary if each is not None]):
-        assert [round(value, 2) for value in nonempty(values)] == values
 
 
 def test_coordinates_and_angles_have_the_units_of_their_result() -> None:

@@ -11,8 +11,8 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
+from photostrip.result.description import result_page, result_schema
 from photostrip.result.document import document_of
-from photostrip.result.schema import result_page, result_schema
 from photostrip.result.table import plain_of
 from photostrip.simulation import Models, Spec, simulate
 from tests.loops import nonempty
