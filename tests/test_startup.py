@@ -79,7 +79,7 @@ DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "most"),
-    [(("run", DROP, "--quiet"), 325), (("check",), 255), (("run", "--help"), 75)],
+    [(("run", DROP, "--quiet"), 150), (("check",), 125), (("run", "--help"), 40)],
 )
 def test_modules_are_a_budget(arguments: tuple[str, ...], most: int) -> None:
     """A module takes about a millisecond, a two-hundredth of what numpy, pyproj and yaml take together."""

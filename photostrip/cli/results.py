@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,7 +28,7 @@ from photostrip.cli.options import (
     refuse_sections,
 )
 from photostrip.cli.output import Messages, print_json, print_result, print_sections
-from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE
+from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE, InputError
 
 if TYPE_CHECKING:
     from photostrip.comparison import Tolerances
@@ -164,7 +163,7 @@ def compare(
     """
     from photostrip.formats.result_json import line_finder, text_of
     from photostrip.library.comparison import compare as compared
-    from photostrip.library.comparison import compare_again, results_below
+    from photostrip.library.comparison import compare_again, place_of
     from photostrip.project.tolerances import load_tolerances
     from photostrip.report.commands.compare import TRUTH, compare_cases, compare_findings, comparison_report
     from photostrip.report.page.messages import annotated, to_junit
@@ -176,13 +175,13 @@ def compare(
         if baseline is None:
             found = compare_again(result, project, allowed)
         elif update:
-            for name, file in (results_below(result) or {"": result}).items():
-                changes = _update(file, baseline / name / "baseline.json" if name else baseline, allowed)
-                Messages(quiet=quiet).say(changes)
+            _update_all(result, baseline, allowed, Messages(quiet=quiet))
             return EXIT_DONE
         else:
-            with _told_how_to_write(baseline):
+            try:
                 found = compared(result, baseline, tolerances=allowed).document
+            except InputError as error:
+                raise _told_how_to_write(error, str(place_of(baseline))) from None
         if TRUTH in found and form in {"junit", "github"}:
             refuse("--format", "true errors have no tolerances that a test could keep: text, md or json")
         match form:
@@ -199,30 +198,28 @@ def compare(
     return {"refused": EXIT_INPUT, "different": EXIT_TOLERANCE}.get(found.get("status", ""), EXIT_DONE)
 
 
-@contextmanager
-def _told_how_to_write(baseline: Path) -> Iterator[None]:
+def _told_how_to_write(error: InputError, place: str) -> InputError:
     """Where there is no baseline, or none that is whole, let the fault say how it comes to be."""
-    from dataclasses import replace
+    missing = {"file-missing", "result-incomplete"}
+    return InputError(
+        replace(fault, fix=f"{fault.fix + '; ' if fault.fix else ''}--update writes it")
+        if fault.code in missing and fault.file == place
+        else fault
+        for fault in error.faults
+    )
 
-    from photostrip.errors import InputError
-    from photostrip.library.comparison import place_of
 
-    place = str(place_of(baseline))
-    try:
-        yield
-    except InputError as error:
-        raise InputError(
-            replace(fault, fix=f"{fault.fix + '; ' if fault.fix else ''}--update writes it")
-            if fault.code in {"file-missing", "result-incomplete"} and fault.file == place
-            else fault
-            for fault in error.faults
-        ) from None
+def _update_all(result: Path, baseline: Path, allowed: Tolerances | None, messages: Messages) -> None:
+    """Write a result, or all of a folder, as baselines; say what changes by each."""
+    from photostrip.library.comparison import BASELINE, results_below
+
+    for name, file in (results_below(result) or {"": result}).items():
+        messages.say(_update(file, baseline / name / BASELINE if name else baseline, allowed))
 
 
 def _update(result: Path, baseline: Path, allowed: Tolerances | None) -> str:
     """Write a result as the baseline; return what changes by it."""
     from photostrip.comparison import baseline_of, compare_results
-    from photostrip.errors import InputError
     from photostrip.formats.files import write_text
     from photostrip.formats.result_json import read_baseline, read_result, to_json
     from photostrip.library.comparison import place_of

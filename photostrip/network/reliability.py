@@ -273,8 +273,7 @@ def correlations(solution: BundleSolution, precision: Cofactors) -> tuple[Correl
     """
     problem = solution.prepared.problem
     names = problem.common_names()
-    turn = np.tile(np.eye(problem.unknowns), (problem.photos, 1, 1))
-    turn[:, :3, :3] = turn[:, 3:6, 3:6] = np.swapaxes(solution.rotations, 1, 2)
+    turn = _turns(np.swapaxes(solution.rotations, 1, 2), problem.unknowns)
     photos = turn @ precision.photos @ turn.swapaxes(1, 2)
     cross = turn @ precision.photo_common
     sigma = np.sqrt(np.einsum("nii->ni", photos))

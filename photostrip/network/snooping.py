@@ -36,6 +36,7 @@ from photostrip.network.problem import BundleProblem, BundleSettings, PositionOb
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, JointCofactors, Limit, cofactors_of
 from photostrip.network.testing import (
     START,
+    WRONG_COLUMNS,
     Adjusted,
     RayDecisions,
     RayLog,
@@ -43,6 +44,7 @@ from photostrip.network.testing import (
     cause_of_all,
     decide_rays,
 )
+from photostrip.points import take_rows
 from photostrip.rejection import Rejection
 from photostrip.strip.control_screening import LARGEST_SHARE
 from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
@@ -485,7 +487,7 @@ class _Search:
             self.spared[points] = True
             return done
         for half in (first, ~first):
-            done = self._without_rays(done, worst.take(np.flatnonzero(half)))
+            done = self._without_rays(done, take_rows(worst, half, ("row", *WRONG_COLUMNS)))
         return done
 
     def _without_given(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:

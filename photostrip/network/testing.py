@@ -336,14 +336,8 @@ class WrongRays:
     def __len__(self) -> int:
         return len(self.row)
 
-    def take(self, chosen: Numbers) -> WrongRays:
-        return WrongRays(
-            row=self.row[chosen],
-            value=self.value[chosen],
-            limit=self.limit[chosen],
-            size=self.size[chosen],
-            cause=self.cause[chosen],
-        )
+
+WRONG_COLUMNS = "value", "limit", "size", "cause"
 
 
 class RayLog:
@@ -357,7 +351,7 @@ class RayLog:
         self.size, self.cause = np.full((rays, coordinates), np.nan), np.where(begin, AGREE, SEVERAL)
 
     def say(self, wrong: WrongRays) -> None:
-        for column in ("value", "limit", "size", "cause"):
+        for column in WRONG_COLUMNS:
             getattr(self, column)[wrong.row] = getattr(wrong, column)
         self.said[wrong.row] = True
 

@@ -174,17 +174,27 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
         _strip(strip, begin, calibrated, used, points, bundle)
         for strip, (_, begin) in zip(start.strips, places, strict=True)
     )
-    sigma = np.median(block.problem.images.sigma) * bundle.unit
-    covariances = bundle.screened.precision.points[number] * bundle.unit**2
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
-    basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
-    precision = Precision(points=covariances, photos=photos, sigma=(sigma,) * len(strips), basis=(basis,) * len(strips))
+    return _in_one_network(bundle, calibrated, strips, points, photos, np.median(block.problem.images.sigma))
+
+
+def _in_one_network(
+    bundle: Bundle,
+    observations: PhotoPoints,
+    strips: tuple[StripResult, ...],
+    points: Adjusted,
+    photos: tuple[Floats, ...],
+    sigma: float,
+) -> AdjustedStrips:
+    """Put strips, points and their precision together; sigma: stated for an image or model coordinate, mm."""
+    basis, count = "a-priori" if bundle.unit == 1.0 else "a-posteriori", len(strips)
+    covariances = bundle.screened.precision.points[points.number] * bundle.unit**2
     return AdjustedStrips(
         strips=strips,
         points=points,
         ties=Ties.none(),  # a point has one position
-        observations=calibrated,
-        precision=precision,
+        observations=observations,
+        precision=Precision(covariances, photos, sigma=(sigma * bundle.unit,) * count, basis=(basis,) * count),
         notes=notes(bundle),
         bundle=bundle,
     )
@@ -289,23 +299,8 @@ def adjusted_models(
     shown = _photos_of_points(models, used, count)
     points = in_output(number, cartesian[number], shown[number], observations.point_ids, output)
     strips = tuple(_strip_of_models(strip, models, bundle, used, cartesian, held) for strip in bundle.start.strips)
-    sigma = float(np.median(measured.sigma)) * bundle.unit
-    basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
-    precision = Precision(
-        points=covariances[number],
-        photos=tuple(_of_centers(strip, held, covariances) for strip in strips),
-        sigma=(sigma,) * len(strips),
-        basis=(basis,) * len(strips),
-    )
-    return AdjustedStrips(
-        strips=strips,
-        points=points,
-        ties=Ties.none(),  # a point has one position
-        observations=observations,
-        precision=precision,
-        notes=notes(bundle),
-        bundle=bundle,
-    )
+    photos = tuple(_of_centers(strip, held, covariances) for strip in strips)
+    return _in_one_network(bundle, observations, strips, points, photos, float(np.median(measured.sigma)))
 
 
 def _photos_of_points(models: MeasuredModels, used: Numbers, count: int) -> Numbers:

@@ -76,7 +76,7 @@ def build(
         sigma=observations.sigma[rows],
     )
     given, control_rows = control_observations(control, ground.control, observations, start, origin)
-    positions = _positions(inputs, ground.positions, ground.orientations, start, origin)
+    positions, level = _positions(inputs, ground.positions, ground.orientations, start, origin)
     attitudes = _attitudes(inputs.orientations, ground.orientations, start)
     geocentric = ground.positions is not None and ground.positions.kind == "geocentric"
     problem = BundleProblem(
@@ -92,17 +92,20 @@ def build(
         group_ids=tuple(dict.fromkeys(_groups(inputs))),
         position_axes=CARTESIAN_AXES if geocentric else GROUND_AXES,
     )
-    level = {
-        "control": tuple(
-            ground.control[number].kind != "geocentric" for number in control.frame[control_rows].tolist()
-        ),
-        "position": _level_positions(inputs, ground.positions, ground.orientations),
-    }
-    begin = _begin(problem, rows, control, control_rows, start)
-    kept = _named(settings.relative.keep, observations)[rows]
     return BlockProblem(
-        problem=problem, origin=origin, begin=begin, kept=kept, rows=rows, control=control_rows, level=level
+        problem=problem,
+        origin=origin,
+        begin=_begin(problem, rows, control, control_rows, start),
+        kept=_named(settings.relative.keep, observations)[rows],
+        rows=rows,
+        control=control_rows,
+        level={"control": _level(ground.control, given.frame), "position": level},
     )
+
+
+def _level(frames: Sequence[GroundFrame], numbers: Numbers) -> tuple[bool, ...]:
+    """Whether the axes of each row are plan and height, by the numbers of the frames."""
+    return tuple(frames[number].kind != "geocentric" for number in numbers.tolist())
 
 
 def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
@@ -178,11 +181,13 @@ def control_observations(
 
 def _positions(
     inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None, start: BlockStart, origin: Floats
-) -> PositionObservations:
-    """Camera positions, and the centres of observed orientations, as observations."""
+) -> tuple[PositionObservations, tuple[bool, ...]]:
+    """Camera positions and centres of observed orientations; and whether the axes of each row are plan and height."""
     parts: list[PositionObservations] = []
+    level: list[bool] = []
     if inputs.positions is not None and frame is not None and len(inputs.positions.photos):
         parts.append(_measured(inputs, inputs.positions, frame, start, origin))
+        level += [frame.kind != "geocentric"] * len(parts[-1])
     orientations = inputs.orientations
     if orientations is not None and of_orientations is not None and orientations.observed and orientations.photos:
         photo = start.rows_of(orientations.photos)
@@ -202,11 +207,12 @@ def _positions(
                 time=np.zeros(len(photo)),
             )
         )
+        level += [of_orientations.kind != "geocentric"] * len(photo)
     if len(parts) < 2:
-        return parts[0] if parts else PositionObservations()
+        return parts[0] if parts else PositionObservations(), tuple(level)
     names = ("photo", "xyz", "axes", "sigma", "lever", "group", "time")
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return replace(parts[0], **joined)
+    return replace(parts[0], **joined), tuple(level)
 
 
 def _measured(
@@ -246,18 +252,6 @@ def _groups(inputs: Inputs) -> list[str]:
     if inputs.positions is not None and inputs.positions.group == BLOCK:
         return ["of the block"] * len(inputs.strips)
     return [strip.id if strip.listed else "of the photos in no order" for strip in inputs.strips]
-
-
-def _level_positions(
-    inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None
-) -> tuple[bool, ...]:
-    """Whether the axes of each row of the positions are plan and height."""
-    level: list[bool] = []
-    if inputs.positions is not None and frame is not None:
-        level += [frame.kind != "geocentric"] * len(inputs.positions.photos)
-    if inputs.orientations is not None and of_orientations is not None and inputs.orientations.observed:
-        level += [of_orientations.kind != "geocentric"] * len(inputs.orientations.photos)
-    return tuple(level)
 
 
 def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start: BlockStart) -> AttitudeObservations:
@@ -432,7 +426,6 @@ def build_models(
     for strip in start.strips:
         formed = strip.of_models.formed
         agree[formed.models.row[formed.used]] = True
-    level = tuple(ground.control[number].kind != "geocentric" for number in control.frame[control_rows].tolist())
     return BlockProblem(
         problem=problem,
         origin=origin,
@@ -444,7 +437,7 @@ def build_models(
         kept=rows_of_models(settings.links.keep, measured)[rows],
         rows=rows,
         control=control_rows,
-        level={"control": level, "position": ()},
+        level={"control": _level(ground.control, given.frame), "position": ()},
     )
 
 

@@ -1,22 +1,47 @@
-"""Estimates, cofactors and redundancy numbers against a dense adjustment that was written apart."""
+"""Estimates, cofactors and redundancy numbers against a dense adjustment that was written apart.
+
+The factor of a band, and the elements of its inverse, against dense algebra.
+
+The same bundle adjustments by Ceres: kept solutions, and solved anew where pyceres and pycolmap are installed.
+
+Self-calibration: the parameters of the table are those that the formulas correct by.
+"""
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from photostrip.camera import Camera
 from photostrip.geometry.rotation import from_vector
 from photostrip.network.adjustment import solve
-from photostrip.network.problem import AttitudeObservations, BundleProblem, ControlObservations, PositionObservations
+from photostrip.network.normal_equations import Band
+from photostrip.network.observations import corrections
+from photostrip.network.problem import (
+    ASKED,
+    CALIBRATION,
+    AttitudeObservations,
+    BundleProblem,
+    ControlObservations,
+    PositionObservations,
+)
 from photostrip.network.reliability import cofactors_of
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Points, Spec, simulate
+from tests.peer import FILE, SHAPES, problem
 from tests.simulated_bundle import problem_of, truth_of
+from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,6 +51,7 @@ if TYPE_CHECKING:
     from photostrip.network.adjustment import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
+
 
 # Steps of the differences by parameter.
 STEPS = {"c": 1e-2, "x0": 1e-2, "y0": 1e-2, "k1": 1e-9, "k2": 1e-13, "k3": 1e-17, "p1": 1e-7, "p2": 1e-7}
@@ -337,3 +363,102 @@ def test_thousands_of_photos_without_control_keep_their_redundancy_numbers() -> 
     images = solution.prepared.problem.images
     numbers = np.diagonal(cofactors_of(solution).image_residuals, axis1=1, axis2=2) / images.sigma**2
     assert numbers.sum() == pytest.approx(solution.redundancy, rel=2e-3)
+
+
+def matrix_with_band(size: int, width: int, seed: int) -> Floats:
+    """Make a positive definite matrix with a band."""
+    random = np.random.default_rng(seed)
+    root = np.triu(np.tril(random.normal(size=(size, size))), -width) + (width + 2.0) * np.eye(size)
+    found: Floats = root @ root.T
+    return found
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 27), st.integers(0, 12), st.integers(0, 1000))
+def test_a_band_is_factored_solved_and_inverted(photos: int, near: int, seed: int) -> None:
+    size, near = 6 * photos, min(near, photos - 1)
+    width = 6 * (near + 1) - 1
+    matrix = matrix_with_band(size, width, seed)
+    row, column = np.tril_indices(size)
+    within = row - column <= width
+    row, column = row[within], column[within]
+    band = Band(size, width, 6)
+    band.flat[band.place(row, column)] = matrix[row, column]
+    assert band.factor()
+    right = np.random.default_rng(seed).normal(size=(size, 3))
+    np.testing.assert_allclose(band.solve(right), np.linalg.solve(matrix, right), rtol=1e-8, atol=1e-12)
+    inverse = np.linalg.inv(matrix).reshape(photos, 6, photos, 6).swapaxes(1, 2)
+    one, other = np.indices((photos, photos))
+    held = band.holds(one, other)
+    assert (held == (np.abs(one - other) <= near)).all()
+    np.testing.assert_allclose(band.inverse().blocks(one[held], other[held]), inverse[held], rtol=1e-8, atol=1e-12)
+
+
+def test_what_is_not_positive_definite_is_told() -> None:
+    band = Band(3, 1, 1)
+    band.flat[band.place(np.arange(3), np.arange(3))] = [1.0, -1.0, 1.0]
+    assert not band.factor()
+
+
+SAME_AS_CERES = 1e-6  # of the standard deviations
+
+
+def compare(name: str, expected: dict[str, list[list[float]]]) -> None:
+    """Compare one problem with a solution by Ceres."""
+    solution = solve(problem(name))
+    cofactors = cofactors_of(solution)
+    seen = ~np.isnan(cofactors.points[:, 0, 0])
+    of_points = np.sqrt(np.einsum("nii->ni", cofactors.points[seen]))
+    of_photos = np.sqrt(np.einsum("nii->ni", cofactors.photos[:, :3, :3]))
+    points, centers = np.array(expected["points"]), np.array(expected["centers"])
+    assert np.abs((solution.points - points)[seen] / of_points).max() < SAME_AS_CERES
+    assert np.abs((solution.centers - centers) / of_photos).max() < SAME_AS_CERES
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_estimate_is_that_of_ceres(name: str) -> None:
+    compare(name, json.loads(FILE.read_text(encoding="utf-8"))[name])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("pyceres") is None or find_spec("pycolmap") is None, reason="the extra peer is missing")
+def test_ceres_still_finds_what_is_kept() -> None:
+    command = [sys.executable, "-m", "tests.peer", "--print"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=120)
+    for name, expected in json.loads(done.stdout).items():
+        compare(name, expected)
+
+
+def test_corrections_grow_with_the_distance_by_the_powers_of_the_table() -> None:
+    xy = np.array([30.0, -50.0])
+    powers = [each.power for each in CALIBRATION.values()]
+    assert corrections(2 * xy) == pytest.approx(2.0 ** np.array(powers)[:, None] * corrections(xy))
+
+
+def test_units_make_millimetres_of_what_a_user_asks_for() -> None:
+    assert ASKED == ("principal_distance", "principal_point", "k1", "k2", "k3", "p1", "p2", "affinity", "shear")
+    units = {name: (each.title, each.unit) for name, each in CALIBRATION.items()}
+    assert [units[name] for name in ("c", "y0", "k2", "p1", "b2")] == [
+        ("principal_distance", "mm"), ("principal_point y", "mm"), ("k2", "mm^-4"), ("p1", "mm^-1"), ("shear", "1"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["k1", "b1"])
+def test_measuring_errors_make_no_distortion(kind: str) -> None:
+    """Of the same errors with both signs: what the mean keeps is what their squares have made."""
+    wide = Camera("wide", principal_distance=8.8, format=(13.2, 8.8))
+    flight = Flight(photos=10, strips=3, end_lap_percent=80.0, side_lap_percent=70.0, flying_height=90.0)
+    simulation = simulate(Spec(camera=wide, flight=flight))
+    problem, truth = problem_of(simulation, shift=0.01, turn=1e-5), simulation.truth
+    free = np.where(np.array(list(CALIBRATION)) == kind, np.inf, 0.0)
+    exact = (truth.points.xyz - truth.points.xyz.mean(axis=0))[problem.control.point]
+    problem = replace(problem, cameras=replace(problem.cameras, sigma=free[None]))
+    problem = replace(problem, control=replace(problem.control, xyz=exact))
+    rays = np.bincount(simulation.observations.point)[simulation.observations.point] > 1
+    errors = problem.images.sigma * np.random.default_rng(1).normal(size=problem.images.xy.shape)
+    both = [
+        solve(replace(problem, images=replace(problem.images, xy=truth.image[rays] + sign * errors)))
+        for sign in (1.0, -1.0)
+    ]
+    sigma = np.sqrt(cofactors_of(both[0]).common[0, 0])
+    assert np.mean([each.common[0] for each in both]) == pytest.approx(0.0, abs=0.05 * sigma)

@@ -1,4 +1,9 @@
-"""What is rejected depends on the measurements alone: not on the order of rows, on names, or on threads."""
+"""What is rejected depends on the measurements alone: not on the order of rows, on names, or on threads.
+
+Measurements that the user keeps or drops, whatever the tests say.
+
+A strip too long for the standard deviations of a polynomial says so, and what has them.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +16,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.errors import InputError
 from photostrip.formats.result_files import csv_pieces
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
-from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, GrossError, Points, Spec
+from photostrip.simulation import Control, Flight, GrossError, Points, Spec, simulate
+from photostrip.strip.relative_orientation import RelativeSettings as Relative
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
+from tests.strips import Flown, control_points, fly, project
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs
-    from photostrip.simulation.simulation import Simulation
+    from photostrip.simulation import Simulation
+
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
@@ -123,3 +133,73 @@ def test_names_do_not_decide() -> None:
         {key: value for key, value in row.items() if key != "reason"} for row in rows(rejected(inputs_of(flown())))
     ]
     assert sorted(found, key=repr) == sorted(expected, key=repr)
+
+
+WRONG = ("105", "p4_1")
+
+
+def spoiled() -> Flown:
+    strip = fly(3, 7, sigma=0.005, extra=60)
+    o = strip.observations
+    row = np.flatnonzero((o.photo == o.photo_ids.index(WRONG[0])) & (o.point == o.point_ids.index(WRONG[1])))
+    xy = o.xy.copy()
+    xy[row, 1] += 0.4
+    return replace(strip, observations=replace(o, xy=xy))
+
+
+def adjusted(keep: tuple[str, ...] = (), drop: tuple[str, ...] = ()) -> Result:
+    strip = spoiled()
+    given = {name: strip.xyz[strip.at[name]] for name in strip.bands(0, 3, 6)}
+    return triangulate(
+        project(strip, control_points(given)), Settings(relative=Relative(keep=list(keep), drop=list(drop)))
+    )
+
+
+def in_use(result: Result, photo: str, point: str) -> bool:
+    o, oriented = result.refined.observations, result.strips[0].of_photos.orientation
+    (row,) = np.flatnonzero((o.photo == o.photo_ids.index(photo)) & (o.point == o.point_ids.index(point)))
+    return bool((oriented.used & (oriented.rows == row).any(axis=1)).any())
+
+
+@pytest.mark.slow
+def test_a_measurement_that_is_kept_stays_in_use_and_is_reported() -> None:
+    result = adjusted(keep=("105/p4_1",))
+    assert in_use(result, *WRONG)
+    (note,) = (note for note in result.notes if note.code == "user-keep")
+    assert "105/p4_1" in note.message
+    back = [r for r in result.strips[0].of_photos.rejections if r.readmitted]
+    assert {int(result.strips[0].of_photos.orientation.point[r.row]) for r in back} == {
+        result.refined.observations.point_ids.index("p4_1")
+    }
+
+
+@pytest.mark.slow
+def test_a_measurement_that_is_dropped_takes_no_part_and_is_reported() -> None:
+    assert in_use(adjusted(), "103", "p2_0")
+    result = adjusted(drop=("103/p2_0",))
+    assert not in_use(result, "103", "p2_0")
+    assert [note.code for note in result.notes if note.code.startswith("user-")] == ["user-drop"]
+
+
+@pytest.mark.parametrize(
+    ("keep", "drop", "words"),
+    [
+        (("105/nobody",), (), "names no measurement"),
+        ((), ("999/p4_1",), "names no measurement"),
+        (("103/p2_0",), ("103/p2_0",), "kept and dropped"),
+    ],
+)
+def test_entries_that_make_no_sense_are_refused(keep: tuple[str, ...], drop: tuple[str, ...], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        adjusted(keep, drop)
+
+
+def test_beyond_400_photos_a_polynomial_asks_for_the_bundle() -> None:
+    spec = Spec(flight=Flight(photos=401), points=Points(extra_per_model=1), control=Control(every=20, check=5))
+    result = triangulate(inputs_of(simulate(spec)), Settings(adjustment="polynomial"))
+    (note,) = [each for each in result.notes if each.code == "no-precision"]
+    assert "strip A has 401 photos" in note.message
+    assert "`processing.adjustment: bundle`" in note.message
+    document = document_of(result)
+    assert "precision" not in document
+    assert {point["sigma_z"] for point in document["points"]} == {None}

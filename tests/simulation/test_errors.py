@@ -1,0 +1,282 @@
+"""Gross errors stand exactly where the truth says, and nowhere else.
+
+Measuring: noise, film and fiducial marks, positions of the cameras.
+
+Film, principal point, lens and air at once: all corrections undo them, and each that is off leaves its part.
+
+Photos are level and the ground is flat, as the formula of refraction takes them to be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from photostrip.camera import Distortion
+from photostrip.errors import InputError
+from photostrip.points import locate
+from photostrip.simulation import FILM as CAMERA
+from photostrip.simulation import (
+    Control,
+    Film,
+    Flight,
+    Gnss,
+    GrossError,
+    Ground,
+    Image,
+    InjectedError,
+    Points,
+    Simulation,
+    Spec,
+    Terrain,
+    simulate,
+)
+from photostrip.simulation.measuring import sheets
+from photostrip.strip import corrections, interior
+from photostrip.strip.corrections import ImageCorrectionSettings, InteriorSettings, refraction_constant
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.camera import Camera
+
+    Floats = NDArray[np.float64]
+
+
+FREE = Spec(image=Image(sigma_um=0.0), control=Control(noise=(0.0, 0.0, 0.0)))
+
+
+def row_of(done: Simulation, photo: str, point: str) -> int:
+    """Row of an image point."""
+    o = done.observations
+    (row,) = np.flatnonzero((o.photo == o.photo_ids.index(photo)) & (o.point == o.point_ids.index(point)))
+    return int(row)
+
+
+def changed(done: Simulation) -> dict[tuple[int, int], float]:
+    """Coordinates that differ from the truth, and by how much."""
+    off = done.observations.xy - done.truth.image
+    return {(int(r), int(c)): float(off[r, c]) for r, c in np.argwhere(np.abs(off) > 1e-9)}
+
+
+def test_a_named_image_error() -> None:
+    entry = GrossError("image", photo="1003", point="1002-2", axis="y", size_um=-250.0)
+    done = simulate(replace(FREE, gross_errors=(entry,)))
+    assert done.truth.errors == (InjectedError("image", "1002-2", "1003", "y", -0.25),)
+    ((place, size),) = changed(done).items()
+    assert place == (row_of(done, "1003", "1002-2"), 1)
+    assert size == pytest.approx(-0.25)
+
+
+def test_points_mistaken_for_each_other() -> None:
+    spec = replace(FREE, control=Control(check=0, noise=(0.0, 0.0, 0.0)))
+    done = simulate(
+        replace(spec, gross_errors=(GrossError("swap", count=3), GrossError("swap", photo="1005", point="1005-1")))
+    )
+    assert len(done.truth.errors) == 4
+    assert done.truth.errors[3].photo == "1005"
+    assert done.truth.errors[3].point == "1005-1"
+    rows = set()
+    for error in nonempty(done.truth.errors):
+        one, other = row_of(done, error.photo, error.point), row_of(done, error.photo, error.other)
+        assert np.array_equal(done.observations.xy[one], done.truth.image[other])
+        assert np.array_equal(done.observations.xy[other], done.truth.image[one])
+        rows |= {one, other}
+    assert len(rows) == 8
+    assert {row for row, _ in changed(done)} == rows
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "local", "geocentric"])
+def test_control_errors(crs: str) -> None:
+    entries = (GrossError("control", point="G02", axis="z", size_m=-3.0), GrossError("control", count=2, size_m=8.0))
+    done = simulate(replace(FREE, ground=Ground(crs=crs), gross_errors=entries))
+    true = done.truth.ground.xyz[locate(done.control.ids, done.truth.ground.ids)]
+    off = done.control.enu - true
+    assert done.truth.errors[0] == InjectedError("control", "G02", axis="z", size=-3.0)
+    expected = np.zeros_like(off)
+    for error in done.truth.errors:
+        expected[done.control.ids.index(error.point), "xyz".index(error.axis)] = error.size
+    assert np.count_nonzero(expected) == 3
+    assert off == pytest.approx(expected, abs=0.005)  # grid metres against metres
+    assert not off[done.control.check].any() or np.abs(off[done.control.check]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        (GrossError("image", photo="9999"), r"gross_errors\[0\]: there are not enough image points on photo 9999"),
+        (GrossError("image", photo="1001", point="G09"), "not enough image points of point G09 on photo 1001"),
+        (GrossError("image", count=100_000), "not enough image points for a gross error"),
+        (GrossError("control", point="K01"), "not enough control coordinates of point K01"),
+        (GrossError("control", count=10), "not enough control coordinates"),
+        (GrossError("swap", count=84), "not enough image points"),
+    ],
+)
+def test_places_that_do_not_exist_are_refused(entry: GrossError, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(replace(FREE, flight=Flight(), gross_errors=(entry,)))
+
+
+LARGE = Spec(flight=Flight(photos=200), points=Points(extra_per_model=9))
+
+
+def test_noise_is_normal_and_as_large_as_stated() -> None:
+    done = simulate(replace(LARGE, image=Image(sigma_um=7.0)))
+    error = (done.observations.xy - done.truth.image) / 0.007
+    n = error.size
+    assert error.std() == pytest.approx(1.0, abs=4 / np.sqrt(2 * n))
+    assert abs(error.mean()) < 4 / np.sqrt(n)
+    assert stats.kstest(error.ravel(), "norm").pvalue > 0.01
+    assert abs(float(np.mean(error[:, 0] * error[:, 1]))) < 4 / np.sqrt(len(error))
+    assert (done.observations.sigma == 0.007).all()
+
+
+@pytest.mark.parametrize("irregular_um", [0.0, 4.0])
+def test_an_affine_transformation_on_the_marks_finds_the_photo(irregular_um: float) -> None:
+    film = Film(irregular_um=irregular_um)
+    spec = Spec(image=Image(sigma_um=0.0), film=film)
+    done, plain = simulate(spec), simulate(replace(spec, film=None))
+    marks = done.fiducials
+    assert marks is not None
+    assert plain.fiducials is None
+    calibrated = np.array([spec.camera.fiducials[name] for name in marks.point_ids])
+    left = []
+    for photo in range(10):
+        on = marks.photo == photo
+        design = np.column_stack([marks.xy[on], np.ones(on.sum())])
+        solution, *_ = np.linalg.lstsq(design, calibrated[marks.point[on]], rcond=None)
+        rows = done.observations.photo == photo
+        restored = np.column_stack([done.observations.xy[rows], np.ones(rows.sum())]) @ solution
+        left.append(restored - plain.observations.xy[rows])
+    largest = np.abs(np.concatenate(left)).max()
+    if irregular_um:
+        assert 0.5 * irregular_um / 1000 < largest < 6 * irregular_um / 1000
+    else:
+        assert largest < 1e-9
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32733", "geocentric", "local"])
+def test_camera_positions(crs: str) -> None:
+    spec = replace(LARGE, ground=Ground(crs=crs, center_deg=(15.0, -20.0)), gnss=Gnss(sigma=(0.1, 0.2, 0.4)))
+    done = simulate(spec)
+    assert done.gnss is not None
+    error = done.gnss - done.truth.centers_ground
+    assert error.std(axis=0) == pytest.approx([0.1, 0.2, 0.4], rel=4 / np.sqrt(2 * 200))
+    assert simulate(LARGE).gnss is None
+
+
+def test_film_is_stretched_sheared_turned_and_shifted_as_stated() -> None:
+    film = Film(scale_ppm=200.0, shear_ppm=60.0, rotation_deg=2.0, offset_mm=4.0)
+    spec = Spec(flight=Flight(photos=400), image=Image(sigma_um=0.0), film=film)
+    marks = simulate(spec).fiducials
+    assert marks is not None
+    xy = {name: marks.xy[marks.point == k] for k, name in enumerate(marks.point_ids)}
+    across, upward = (xy["F8"] - xy["F6"]) / 220.0, (xy["F7"] - xy["F5"]) / 220.0
+    spread = pytest.approx(1.0, rel=4 / np.sqrt(2 * 400))
+    assert np.std(np.hypot(*across.T) - 1.0) / 200e-6 == spread
+    turn = np.arctan2(across[:, 1], across[:, 0])
+    assert np.degrees(turn).std() / 2.0 == spread
+    angle = np.arctan2(upward[:, 1], upward[:, 0]) - turn - np.pi / 2
+    assert angle.std() / 60e-6 == spread
+    assert ((xy["F8"] + xy["F6"]) / 2).std() / 4.0 == pytest.approx(1.0, rel=4 / np.sqrt(4 * 400))
+
+
+MICROMETRE = 1e-3  # mm
+K, P, B = (4e-8, -2e-12, 1e-17), (2e-7, -1e-7), (3e-4, -2e-4)
+LENS = replace(CAMERA, principal_point=(0.35, -0.21), distortion=Distortion("brown", "image_to_ideal", K, P, B))
+SPEC = Spec(
+    camera=LENS,
+    flight=Flight(photos=5, scale=40_000.0, attitude_sigma_deg=(0.0, 0.0, 0.0), position_sigma=(0.0, 0.0, 0.0)),
+    terrain=Terrain(relief=0.0),
+    image=Image(sigma_um=0.0),
+    film=Film(),
+    refraction=True,
+)
+
+
+@pytest.fixture(scope="module")
+def flown() -> Simulation:
+    return simulate(SPEC)
+
+
+def ideal(done: Simulation) -> Floats:
+    """Central projection of the true points, written out."""
+    truth, seen = done.truth, done.observations
+    ray = truth.points.xyz[seen.point] - truth.centers[seen.photo]
+    camera = np.einsum("nji,nj->ni", truth.rotations[seen.photo], ray)
+    return np.asarray(-done.camera.principal_distance * camera[:, :2] / camera[:, 2:])
+
+
+def corrected(done: Simulation, *, transform: str = "affine", camera: Camera = LENS, refraction: bool = True) -> Floats:
+    cameras = dict.fromkeys(done.truth.photo_ids, camera)
+    assert done.fiducials is not None
+    oriented = interior.orient(done.fiducials, cameras, InteriorSettings(transform))
+    photo = interior.transform(done.observations, oriented)
+    flying, ground = (float(xyz[:, 2].mean()) for xyz in (done.truth.centers_ground, done.truth.ground.xyz))
+    settings = ImageCorrectionSettings(refraction=refraction, flying_height=flying, ground_height=ground)
+    return corrections.refine(photo, cameras, settings).observations.xy
+
+
+def largest(shift: Floats) -> float:
+    return float(np.hypot(*shift.T).max())
+
+
+def test_all_corrections_together_give_the_truth(flown: Simulation) -> None:
+    assert largest(corrected(flown) - ideal(flown)) < 0.1 * MICROMETRE
+    assert largest(flown.observations.xy - ideal(flown)) > 0.3  # what they have to take away
+
+
+def shift_of_the_lens(xy: Floats) -> Floats:
+    """Brown's formula in the image points that the ideal ones have."""
+    found = xy
+    for _ in range(20):
+        (k1, k2, k3), (p1, p2), (b1, b2), (x, y) = K, P, B, found.T
+        r2 = x**2 + y**2
+        radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
+        dx = x * radial + p1 * (r2 + 2 * x**2) + 2 * p2 * x * y + b1 * x + b2 * y
+        dy = y * radial + p2 * (r2 + 2 * y**2) + 2 * p1 * x * y
+        found = xy - np.stack([dx, dy], -1)
+    return found - xy
+
+
+def shift_of_the_air(done: Simulation, xy: Floats) -> Floats:
+    """Saastamoinen's dr, outwards."""
+    flying, ground = (float(each[:, 2].mean()) for each in (done.truth.centers_ground, done.truth.ground.xyz))
+    constant = refraction_constant(flying, ground)
+    return np.asarray(constant * xy * (1 + (xy**2).sum(1, keepdims=True) / done.camera.principal_distance**2))
+
+
+def shift_of_the_film(done: Simulation) -> Floats:
+    """What a conformal transformation of the four marks leaves of the affine film, by complex numbers."""
+    film = sheets(done.spec, len(done.truth.photo_ids))
+    assert film is not None
+    marks = np.array(list(done.camera.fiducials.values()))
+    points, found = ideal(done) + np.array(LENS.principal_point), np.zeros((len(done.observations), 2))
+    for photo, matrix in enumerate(film.matrix):
+        seen = (marks @ matrix.T) @ [1, 1j]
+        a, b = np.linalg.lstsq(np.stack([seen, np.ones(len(seen))], -1), marks @ [1, 1j], rcond=None)[0]
+        rows = done.observations.photo == photo
+        left = a * ((points[rows] @ matrix.T) @ [1, 1j]) + b - points[rows] @ [1, 1j]
+        found[rows] = np.stack([left.real, left.imag], -1)
+    return found
+
+
+@pytest.mark.parametrize("effect", ["principal point", "distortion", "refraction", "film"])
+def test_a_correction_that_is_off_leaves_what_theory_says(flown: Simulation, effect: str) -> None:
+    truth = ideal(flown)
+    if effect == "principal point":
+        left, expected = corrected(flown, camera=replace(LENS, principal_point=(0.0, 0.0))), np.array([[0.35, -0.21]])
+    elif effect == "distortion":
+        left, expected = corrected(flown, camera=replace(LENS, distortion=None)), shift_of_the_lens(truth)
+    elif effect == "refraction":
+        left, expected = corrected(flown, refraction=False), shift_of_the_air(flown, truth)
+    else:
+        left, expected = corrected(flown, transform="conformal"), shift_of_the_film(flown)
+    size = largest(np.broadcast_to(expected, truth.shape))
+    assert size > 5 * MICROMETRE
+    assert largest(left - truth - expected) < 0.03 * size
