@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from math import hypot
-from typing import Any
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.parts import Facts, Part, Words
@@ -94,11 +93,8 @@ def differences(document: Document) -> str:
     if not strips:
         return "no common points"
     worst = max(strips, key=lambda strip: strip["discrepancy_up"])
-    return f"rms {_between(worst)}{in_strip(worst['id'], strips)}"
-
-
-def _between(strip: Document) -> str:
-    return ", ".join(f"{metres(strip[f'discrepancy_{name}'])} m {name}" for name in DIRECTIONS)
+    size = ", ".join(f"{metres(worst[f'discrepancy_{name}'])} m {name}" for name in DIRECTIONS)
+    return f"rms {size}{in_strip(worst['id'], strips)}"
 
 
 def in_strip(strip: str, strips: Sequence[object]) -> str:
@@ -118,20 +114,12 @@ def junctions(document: Document) -> Iterator[Part]:
         )
         note = "rms differences of the pass points of two models; spread: of the scale ratio of one pass point"
         yield keyed(document["junctions"], keys, note)
-    yield Facts(_by_strip(document, "scale drift", _drift))
-
-
-def _by_strip(document: Document, label: str, say: Any) -> tuple[tuple[str, str], ...]:  # noqa: ANN401 (of a strip)
-    """Say something of each strip, named where there are several."""
-    several = len(document["strips"]) > 1
-    return tuple((f"{label}, strip {s['id']}" if several else label, say(s)) for s in document["strips"])
-
-
-def _drift(strip: Document) -> str:
-    text = f"{fixed(strip['scale_drift_expected_ppm'], 0)} ppm expected over the strip (one standard deviation)"
-    if strip["scale_drift_found_ppm"] is not None:
-        text += f", {fixed(strip['scale_drift_found_ppm'], 0)} ppm by the polynomial"
-    return text if strip["discrepancy_up"] is None else f"{text}; rms differences between models {_between(strip)}"
+    keys = "id discrepancy_along discrepancy_across discrepancy_up scale_drift_expected_ppm scale_drift_found_ppm"
+    note = (
+        "rms differences between the models of a strip; change of scale from its first model to the last: one standard "
+        "deviation, and what the polynomial takes out"
+    )
+    yield keyed(document["strips"], keys, note)
 
 
 def links(document: Document) -> Iterator[Part]:
@@ -196,14 +184,8 @@ def absolute(document: Document) -> Iterator[Part]:
         "misclosure_rms_up scale:3 angles_deg_alpha:2 angles_deg_omega:2 angles_deg_kappa:2"
     )
     yield keyed(document["absolute"], keys, note)
-    yield Facts(_by_strip(document, "weights", _weights))
-
-
-def _weights(strip: Document) -> str:
-    return (
-        "from the standard deviation of each control coordinate, combined with that of a model point: "
-        f"{metres(strip['precision_plan'])} m in plan, {metres(strip['precision_height'])} m in height"
-    )
+    note = "standard deviation of a point of one model, with which that of a control coordinate is combined for weights"
+    yield keyed(document["strips"], "id precision_plan precision_height", note)
 
 
 def degrees(blocks: Sequence[Document]) -> str:
