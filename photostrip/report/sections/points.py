@@ -299,7 +299,8 @@ def _check(check: Document | None) -> Iterator[tuple[str, str]]:
     ]
     yield "check points", f"{'; '.join(parts)} in units of their standard deviations"
     for test in check["tests"]:
-        text = f"χ² {fixed(test['squares'], 1)} of {counted(test['coordinates'], 'coordinate')}, p = {100 * test['p']:.1f} %"
+        count = counted(test["coordinates"], "coordinate")
+        text = f"chi-square {fixed(test['squares'], 1)} of {count}, p = {100 * test['p']:.1f} %"
         yield "all together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}", text
 
 
