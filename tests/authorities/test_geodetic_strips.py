@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from photostrip.arrays import Floats
 from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
+from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.strip import polynomial
 from tests.strips import control_points, measured
 from tests.vectors import vector
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from photostrip.pipeline.results import Result
-
-    Floats = NDArray[np.float64]
 
 KRASOVSKY = (6378245.0, 6378245.0 * (1 - 1 / 298.3))
 GEOGRAPHIC = FrameSpec("+proj=longlat +a=6378245 +rf=298.3 +no_defs +type=crs", ("east", "north", "up"), "ellipsoidal")
@@ -91,13 +85,3 @@ def test_the_strip_with_noise(frame: str, adjustment: str, degree: str, referenc
     assert np.all(rms > 0.5 * expected)  # such noise cannot leave less
     azimuth = np.degrees(result.strips[0].intermediate.azimuth)
     assert azimuth == pytest.approx(vector("strip-geodetic-2").expected["A0_deg"], abs=0.001)
-
-
-@pytest.mark.slow
-@FRAMES
-def test_auto_is_not_worse_than_the_similarity(frame: str) -> None:
-    auto, similarity = (
-        np.sqrt((errors("strip-geodetic-2", run("strip-geodetic-2", frame, kind)) ** 2).mean())
-        for kind in ("polynomial", "similarity")
-    )
-    assert auto < 1.05 * similarity

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import load_project
 from photostrip.result.document import document_of
 from tests.loops import nonempty
 from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.pipeline.results import Result
 
 DATA = ROOT / "tests" / "data" / "authorities" / "sxb-bundle"
 SAMPLES = ROOT / "sample_data"

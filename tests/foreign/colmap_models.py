@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import photostrip
+from photostrip.arrays import Floats
 from photostrip.result.table import rows_of
 from tests.results import rotation
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
 
 NUMBERS = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4, "FULL_OPENCV": 6, "FOV": 7}
 SPEC = {
@@ -90,22 +87,28 @@ def name_of(photo: str) -> str:
     return f"flight {photo[0]}/Фото {photo}.JPG"
 
 
-def simulated(folder: Path, **changes: object) -> Model:
-    """Write a simulated project into a folder, and give its tie points and true orientations as a model."""
-    simulation = photostrip.simulate({**SPEC, **changes})
-    simulation.write(folder)
-    rows = [line.split(",") for line in simulation.files["observations.csv"].splitlines()[1:]]
+def posed(
+    made: photostrip.Simulation, to_model: Callable[[Floats], Floats], number: Callable[[int], int]
+) -> Iterator[tuple[str, Floats, Floats, Floats, list[int]]]:
+    """Give each photo, its orientation in the model (quaternion, shift), its tie points in pixels and their ids."""
+    rows = [line.split(",") for line in made.files["observations.csv"].splitlines()[1:]]
     numbers: dict[str, int] = {}
-    images = []
-    for number, photo in enumerate(rows_of(simulation.truth["photos"])):
-        center = TO_MODEL.apply(SCALE * np.array([photo[name] for name in "xyz"])) + SHIFT
+    for photo in rows_of(made.truth["photos"]):
         upright = rotation(photo) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
         to_camera = (TO_MODEL * Rotation.from_matrix(upright)).inv()
         own = [row for row in rows if row[0] == photo["id"] and row[1][0] not in "GK"]  # control is marked by hand
-        points = [numbers.setdefault(row[1], 5 * len(numbers) + 2) for row in own]
-        quaternion, shift = to_camera.as_quat()[[3, 0, 1, 2]], -to_camera.apply(center)
+        points = [numbers.setdefault(row[1], number(len(numbers))) for row in own]
+        center = to_model(np.array([photo[name] for name in "xyz"]))
         xy = np.array([[float(each) for each in row[2:4]] for row in own])
-        images.append((997 - 3 * number, quaternion, shift, 4, name_of(photo["id"]), xy, points))
+        yield photo["id"], to_camera.as_quat()[[3, 0, 1, 2]], -to_camera.apply(center), xy, points
+
+
+def simulated(folder: Path, **changes: object) -> Model:
+    """Write a simulated project into a folder, and give its tie points and true orientations as a model."""
+    made = photostrip.simulate({**SPEC, **changes})
+    made.write(folder)
+    photos = posed(made, lambda place: TO_MODEL.apply(SCALE * place) + SHIFT, lambda count: 5 * count + 2)
+    images = [(997 - 3 * n, q, t, 4, name_of(photo), xy, points) for n, (photo, q, t, xy, points) in enumerate(photos)]
     return Model({4: ("OPENCV", 5500, 3667, OPENCV)}, images)
 
 

@@ -5,19 +5,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 import photostrip
 from photostrip.result.table import rows_of
-from tests.foreign.colmap_models import SPEC, Model
-from tests.results import rotation
+from tests.foreign.colmap_models import SCALE, SPEC, TO_MODEL, Model, posed
 from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 FOLDER = ROOT / "sample_data" / "colmap-quarry"
 PIXEL = 0.0024
@@ -30,7 +25,6 @@ CAMERA = {
     "distortion": {"model": "brown", "k": [-2e-4, 0, 0], "direction": "ideal_to_image"},
 }
 FOUND = [round(F + 9.0, 4), WIDTH / 2, HEIGHT / 2, round(K1 + 2e-4, 6)]  # a little off, as without control
-TO_MODEL, SCALE = Rotation.from_rotvec([0.9, -0.4, 2.0]), 0.037
 WRONG = "Q03", "DJI_0007.JPG", 12.0  # a mark beside its point, in x, pixels
 
 
@@ -48,18 +42,13 @@ def write(folder: Path) -> None:
     rows = [line.split(",") for line in made.files["observations.csv"].splitlines()[1:]]
     photos = rows_of(made.truth["photos"])
     names = {photo["id"]: f"DJI_{number:04}.JPG" for number, photo in enumerate(photos, 1)}
-    centers = np.array([[photo[axis] for axis in "xyz"] for photo in photos])
-    numbers: dict[str, int] = {}
-    images = []
-    for number, (photo, place) in enumerate(zip(photos, centers - centers.mean(axis=0), strict=True), 1):
-        upright = rotation(photo) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
-        to_camera = (TO_MODEL * Rotation.from_matrix(upright)).inv()
-        own = [row for row in rows if row[0] == photo["id"] and row[1][0] not in "GK"]
-        xy = np.round([[float(each) for each in row[2:4]] for row in own], 2)
-        points = [numbers.setdefault(row[1], len(numbers) + 1) for row in own]
-        shift = -to_camera.apply(TO_MODEL.apply(SCALE * place))
-        quaternion = to_camera.as_quat()[[3, 0, 1, 2]]
-        images.append((number, quaternion.round(8), shift.round(6), 1, names[photo["id"]], xy, points))
+    middle = np.mean([[photo[axis] for axis in "xyz"] for photo in photos], axis=0)
+    images = [
+        (number, q.round(8), shift.round(6), 1, names[photo], xy.round(2), points)
+        for number, (photo, q, shift, xy, points) in enumerate(
+            posed(made, lambda place: TO_MODEL.apply(SCALE * (place - middle)), lambda count: count + 1), 1
+        )
+    ]
     model = Model({1: ("SIMPLE_RADIAL", WIDTH, HEIGHT, FOUND)}, images)
     model.write_text(folder / "sparse" / "0")
     given = [line.split(",") for line in made.files["control.csv"].splitlines()[1:]]

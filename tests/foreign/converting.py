@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
+import pytest
+
+import photostrip
 from photostrip.cli.main import main
+from photostrip.notes import Document
+from photostrip.project.check import check_project
+from tests.calls import Capture
 from tests.foreign.colmap_models import name_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pytest
+from tests.loops import nonempty
 
 
 def convert(source: Path, target: Path, *options: str) -> int:
     return main(["convert", str(source), "-o", str(target), "--sigma", "0.5", *options])
 
 
-def refused(capsys: pytest.CaptureFixture[str], source: Path, target: Path, *options: str) -> str:
+def refused(capsys: Capture, source: Path, target: Path, *options: str) -> str:
     """Give what is said of a source that is refused; nothing is written then."""
     assert convert(source, target, *options) == 2
     captured = capsys.readouterr()
@@ -36,3 +39,24 @@ def with_control(native: Path, converted: Path) -> Path:
     with (converted / "project.yaml").open("a", encoding="utf-8") as file:
         file.write(text[text.index("control:") :])
     return converted / "project.yaml"
+
+
+def same_points(
+    project: Path, native: Path, kinds: str = "GK", to_map: Callable[..., tuple[float, float]] | None = None
+) -> tuple[Document, Document]:
+    """Run a converted project and the native one: control and check points come out alike.
+
+    to_map: brings longitude and latitude of the converted one to the map of the native one.
+    """
+    assert check_project(project).faults == ()
+    found, known = photostrip.run(project).document, photostrip.run(native / "project.yaml").document
+    at, expected = ({each["id"]: each for each in document["points"]} for document in (found, known))
+    for point in nonempty([each for each in expected if each[0] in kinds]):
+        x, y, z, *sigmas = (at[point][name] for name in ("x", "y", "z", "sigma_z", "sigma_x"))
+        if to_map:
+            x, y = to_map(x, y)
+            sigmas.pop()
+        wanted = [expected[point][name] for name in ("x", "y", "z", "sigma_z", "sigma_x")]
+        assert [x, y, z] == pytest.approx(wanted[:3], abs=5e-4)
+        assert sigmas == pytest.approx(wanted[3 : 3 + len(sigmas)], abs=3e-4)
+    return found, known

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import csv
-from typing import TYPE_CHECKING
+from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import photostrip
+from photostrip.arrays import Floats
+from photostrip.notes import Document
 from photostrip.result.table import rows_of
 from tests.foreign.colmap_models import K1, P1, P2, SPEC, F
 from tests.results import rotation
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Document
 
 UTM = (
     'PROJCS["WGS 84 / UTM zone 33N",GEOGCS["WGS 84",DATUM["World Geodetic System 1984",SPHEROID["WGS 84",6378137,'
     '298.257223563,AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0],UNIT["degree",'
     '0.01745329251994328],AUTHORITY["EPSG","4326"]],PROJECTION["Transverse_Mercator"],AUTHORITY["EPSG","32633"]]'
 )
-LOCAL = 'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1]]'
 TO_CHUNK = Rotation.from_rotvec([0.9, -0.4, 2.0])
 SCALE = 12.35  # metres in a unit of the chunk
 CY = 5500 / 3 + 5 - 3667 / 2  # the frame of the simulation is no whole number of pixels high
@@ -67,7 +62,7 @@ def cameras(truth: Document, to_earth: Floats, origin: Floats) -> list[str]:
     return lines
 
 
-def markers(native: Path, truth: Document, *, sigmas: bool = True) -> tuple[list[str], list[str]]:
+def markers(native: Path, truth: Document) -> tuple[list[str], list[str]]:
     """Give the control of a native project and its marks."""
     cameras_of = {photo["id"]: 40 + number for number, photo in enumerate(rows_of(truth["photos"]))}
     with (native / "observations.csv").open(encoding="utf-8") as file:
@@ -76,9 +71,8 @@ def markers(native: Path, truth: Document, *, sigmas: bool = True) -> tuple[list
         control = list(csv.DictReader(file))
     lines, marks = [], []
     for number, row in enumerate(control):
-        sigma = ' sx="0.01" sy="0.01" sz="0.015"' if sigmas else ""
         enabled = "false" if row["role"] == "check" else "true"
-        place = f'x="{row["x"]}" y="{row["y"]}" z="{row["z"]}"{sigma} enabled="{enabled}"'
+        place = f'x="{row["x"]}" y="{row["y"]}" z="{row["z"]}" sx="0.01" sy="0.01" sz="0.015" enabled="{enabled}"'
         lines.append(f'      <marker id="{number}" label="{row["point"]}"><reference {place}/></marker>')
         own = [ray for ray in rays if ray["point"] == row["point"]]
         marks.append(f'          <marker marker_id="{number}">')

@@ -5,17 +5,15 @@ from __future__ import annotations
 import csv
 import gzip
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pyproj import Transformer
 from scipy.spatial.transform import Rotation
 
 from tests.foreign.colmap_models import K1, P1, P2, F, Model, name_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 WIDTH, HEIGHT = 5500, 3667
 BROWN = {

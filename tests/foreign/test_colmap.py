@@ -3,55 +3,32 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import photostrip
 from photostrip.cli.main import main
-from photostrip.project.check import check_project
+from tests.calls import Capture
 from tests.foreign.colmap_models import simulated
-from tests.foreign.converting import convert, refused, with_control
+from tests.foreign.converting import convert, refused, same_points, with_control
 from tests.loops import nonempty
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 KINDS = ("text", "binary")
 
 
-# ----------------------------------------------------------------------------------------------------- results
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("crs", ["local", "EPSG:32633"])
+@pytest.mark.parametrize(("kind", "crs"), [("text", "local"), ("binary", "EPSG:32633")])
 def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, kind: str, crs: str) -> None:
     model = simulated(tmp_path / "native", ground={"crs": crs})
     assert convert(model.write(tmp_path / "model", kind), tmp_path / "block", "-q") == 0
-    project = with_control(tmp_path / "native", tmp_path / "block")
-    assert check_project(project).faults == ()
-    found, known = photostrip.run(project), photostrip.run(tmp_path / "native" / "project.yaml")
-    assert found.document["verdict"]["look_at"] == known.document["verdict"]["look_at"] == []
-    at, expected = ({each["id"]: each for each in result.document["points"]} for result in (found, known))
-    for name in ("x", "y", "z", "sigma_x", "sigma_z"):
-        given = [each for each in expected if each[0] in "GK"]
-        assert [at[each][name] for each in given] == pytest.approx([expected[each][name] for each in given], abs=3e-4)
-    assert any("laid on the control: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
+    found, known = same_points(with_control(tmp_path / "native", tmp_path / "block"), tmp_path / "native")
+    assert found["verdict"]["look_at"] == known["verdict"]["look_at"] == []
+    assert any("laid on the control: 1 unit of it is 27.0" in each["message"] for each in found["notes"])
 
 
-def test_text_and_binary_are_the_same_project(tmp_path: Path) -> None:
-    model = simulated(tmp_path / "native")
-    for kind in KINDS:
-        assert convert(model.write(tmp_path / kind, kind), tmp_path / kind / "block", "-q") == 0
-    for name in ("observations.csv", "orientations.csv"):
-        assert (tmp_path / "text/block" / name).read_bytes() == (tmp_path / "binary/block" / name).read_bytes()
-    one, other = ((tmp_path / kind / "block/project.yaml").read_text(encoding="utf-8") for kind in KINDS)
-    assert one.partition("\n")[2] == other.partition("\n")[2]  # but for the first line, which says what it is from
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("rigs", "cameras"), [(2, 1), (1, 2)])
+@pytest.mark.parametrize(("kind", "rigs", "cameras"), [("text", 2, 1), ("binary", 1, 2)])
 @pytest.mark.parametrize(
     ("model", "parameters"),
     [
@@ -84,10 +61,7 @@ def test_what_pycolmap_writes_fits_without_residuals(
     assert len(found["points"]) == 40
 
 
-# -------------------------------------------------------------------------------------------- what is understood
-
-
-def test_what_was_understood_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_was_understood_is_printed(tmp_path: Path, capsys: Capture) -> None:
     model = simulated(tmp_path / "native")
     assert convert(model.write_text(tmp_path / "model"), tmp_path / "block") == 0
     captured = capsys.readouterr()
@@ -97,10 +71,7 @@ def test_what_was_understood_is_printed(tmp_path: Path, capsys: pytest.CaptureFi
     assert captured.err.startswith("wrote observations.csv, orientations.csv, project.yaml to")
 
 
-# ----------------------------------------------------------------------------------------------------- refusals
-
-
-def test_what_the_files_do_not_carry_is_asked_for_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_the_files_do_not_carry_is_asked_for_by_name(tmp_path: Path, capsys: Capture) -> None:
     source = simulated(tmp_path / "native").write_text(tmp_path / "model")
     assert main(["convert", str(source), "-o", str(tmp_path / "block")]) == 2
     assert "the files do not say how precise an image coordinate is; give --sigma PX" in capsys.readouterr().err
@@ -108,7 +79,7 @@ def test_what_the_files_do_not_carry_is_asked_for_by_name(tmp_path: Path, capsys
     assert "--pixel-size: nan mm is no length" in refused(capsys, source, tmp_path / "block", "--pixel-size", "nan")
 
 
-def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: Capture) -> None:
     source = simulated(tmp_path / "native").write_text(tmp_path / "model")
     before = (tmp_path / "native" / "project.yaml").read_bytes()
     assert convert(source, tmp_path / "native") == 2
@@ -146,7 +117,7 @@ TEXTS: dict[str, tuple[str, str, str]] = {  # cameras, images, what is told
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_faults_of_a_text_have_their_line(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_faults_of_a_text_have_their_line(tmp_path: Path, name: str, capsys: Capture) -> None:
     cameras, images, told = TEXTS[name]
     (tmp_path / "cameras.txt").write_text((cameras or "1 PINHOLE 9 9 9 9 5 5") + "\n", encoding="utf-8")
     (tmp_path / "images.txt").write_text(images or f"{IMAGE}\n\n", encoding="utf-8")
@@ -167,9 +138,7 @@ BYTES: dict[str, tuple[Any, str]] = {  # what is done to the bytes of images.bin
 
 
 @pytest.mark.parametrize("name", BYTES)
-def test_faults_of_a_binary_model_have_their_record(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_faults_of_a_binary_model_have_their_record(tmp_path: Path, name: str, capsys: Capture) -> None:
     change, told = BYTES[name]
     path = simulated(tmp_path / "native").write_binary(tmp_path / "model") / "images.bin"
     path.write_bytes(change(path.read_bytes()))

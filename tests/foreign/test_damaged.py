@@ -7,9 +7,10 @@ import io
 import os
 import re
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -18,15 +19,10 @@ from photostrip.project.check import check_project
 from tests.foreign import historix_blocks, opensfm_models
 from tests.foreign.colmap_models import small_model
 from tests.foreign.converting import convert
-from tests.foreign.test_control import SIGMA, UTM, Block
-from tests.foreign.test_events import HEAD, mrk, pos
-from tests.foreign.test_events import small as small_events
+from tests.foreign.test_control import HEAD, SIGMA, UTM, Block, mrk, pos
+from tests.foreign.test_control import small as small_events
 from tests.foreign.test_metashape import small as small_cameras
 from tests.loops import nonempty
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 DAMAGED = int(os.environ.get("PHOTOSTRIP_DAMAGED", "40"))  # files of each kind
 WORDS = [b"nan", b"inf", b"-1", b"0", b"1e999", b"1e300", b"-", b"#", b"x", b"\xff", b"\0", b"\n", b" ", b"\t", b"2.5",

@@ -5,8 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import laspy
 import numpy as np
 import pycolmap
 import pyogrio
@@ -16,18 +19,16 @@ from pyproj import CRS, Transformer
 from scipy.spatial.transform import Rotation
 
 import photostrip
+from photostrip.arrays import Floats
 from photostrip.cli.main import main
 from photostrip.formats.result_json import read_result
+from tests.calls import Capture
 from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
 from tests.results import rotation
 
-if TYPE_CHECKING:
-    from pathlib import Path
+Document = dict[str, Any]
 
-    from photostrip.arrays import Floats
-
-    Document = dict[str, Any]
 
 UTM = "EPSG:32633"
 GROUNDS: dict[str, Document] = {
@@ -66,7 +67,7 @@ def east_first(document: Document, records: list[Document], names: str = "x y z"
     return np.array([[each[name] for name in names.split()] for each in records], float)[:, order]
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def refused(capsys: Capture, *arguments: str) -> str:
     """Give what is said of wrong usage."""
     capsys.readouterr()
     assert main(["convert", *arguments]) == 2
@@ -78,9 +79,6 @@ def number_in(text: str, pattern: str) -> float:
     found = re.search(pattern, text)
     assert found is not None, text
     return float(found[1])
-
-
-# ----------------------------------------------------------------------------------- rigorous image points
 
 
 def geocentric(crs: str, enu: Floats) -> Floats:
@@ -133,9 +131,6 @@ def adjusted_image_points(document: Document) -> dict[tuple[str, str], Floats]:
 def measured_image_points(folder: Path, project: str = "project") -> dict[tuple[str, str], Floats]:
     with (folder / project / "observations.csv").open(encoding="utf-8") as file:
         return {(row["photo"], row["point"]): np.array([row["x"], row["y"]], float) for row in csv.DictReader(file)}
-
-
-# ------------------------------------------------------------------------------------------------ GeoPackage
 
 
 def layer(file: Path, name: str) -> tuple[list[Document], list[Any], Document]:
@@ -204,9 +199,6 @@ def test_footprints_are_the_corners_of_the_photos_on_the_ground(block: Ran, tmp_
         )  # scale of the map
 
 
-# -------------------------------------------------------------------------------------------------- orthority
-
-
 def table(file: Path) -> list[Document]:
     with file.open(encoding="utf-8") as text:
         return list(csv.DictReader(text))
@@ -230,7 +222,7 @@ def by_orthority(camera: Document, xyz: Floats, opk: Floats, points: Floats) -> 
 
 
 def test_orthority_has_every_orientation_and_the_departure_of_its_map_is_told(
-    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    block: Ran, tmp_path: Path, capsys: Capture
 ) -> None:
     document = block.document
     capsys.readouterr()
@@ -256,9 +248,6 @@ def test_orthority_has_every_orientation_and_the_departure_of_its_map_is_told(
         told = number_in(said, r"by up to ([\d.]+) px")
         assert told == pytest.approx(max(away), abs=0.01)
         assert CRS.from_wkt((tmp_path / "ori.prj").read_text(encoding="utf-8")) == CRS(UTM)
-
-
-# ----------------------------------------------------------------------------------------------------- COLMAP
 
 
 def test_pycolmap_projects_the_points_of_a_model_onto_the_adjusted_image_points(block: Ran, tmp_path: Path) -> None:
@@ -287,7 +276,7 @@ def test_pycolmap_projects_the_points_of_a_model_onto_the_adjusted_image_points(
     ],
 )
 def test_heights_of_a_curved_ground_are_those_of_a_cartesian_frame(
-    ground: Document, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ground: Document, option: str, tmp_path: Path, capsys: Capture
 ) -> None:
     flight = {"photos": 5, "strips": 1, "flying_height": 3000}
     found = ran(tmp_path, "--set", option, ground=ground, flight=flight)
@@ -315,7 +304,7 @@ def test_heights_of_a_curved_ground_are_those_of_a_cartesian_frame(
     ],
 )
 def test_a_distortion_that_colmap_does_not_know_is_fitted_and_its_departure_told(
-    changes: Document, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    changes: Document, tmp_path: Path, capsys: Capture
 ) -> None:
     lens = {"model": "brown", "direction": "image_to_ideal", **changes}
     found = ran(tmp_path, camera={**SPEC["camera"], "distortion": lens})
@@ -359,9 +348,6 @@ def off_the_measured(found: Ran, model: Path) -> float:
     return largest
 
 
-# ----------------------------------------------------------------------------------------------------- OpenSfM
-
-
 def by_opensfm(camera: Document, shot: Document, points: Floats) -> Floats:
     """Project points as OpenSfM documents its brown camera, in pixels from the corner of the first one."""
     x, y, z = (Rotation.from_rotvec(shot["rotation"]).apply(points) + shot["translation"]).T
@@ -401,9 +387,6 @@ def test_opensfm_projects_the_points_of_a_reconstruction_onto_the_adjusted_image
     assert np.array([each["coordinates"] for each in found["points"].values()]) == pytest.approx(xyz, abs=1e-4)
 
 
-# ------------------------------------------------------------------------------------------ both ways, refusals
-
-
 def test_a_run_writes_what_its_project_asks_for_and_a_saved_result_gives_the_same_bytes(tmp_path: Path) -> None:
     asked = "export=[a.gpkg,maps/ori.csv,maps/ori.geojson,model/]"
     found = ran(tmp_path, "--set", asked, ground=GROUNDS["map"])
@@ -435,7 +418,7 @@ def test_a_run_writes_what_its_project_asks_for_and_a_saved_result_gives_the_sam
     ],
 )
 def test_a_wrong_name_in_a_project_is_refused_before_anything_is_computed(
-    name: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, said: str, tmp_path: Path, capsys: Capture
 ) -> None:
     photostrip.simulate(SPEC).write(tmp_path)
     assert main(["check", str(tmp_path / "project.yaml"), "--set", f"export=[{name}]"]) == 2
@@ -443,9 +426,7 @@ def test_a_wrong_name_in_a_project_is_refused_before_anything_is_computed(
     assert said in printed.out + printed.err
 
 
-def test_what_cannot_be_written_is_refused_and_nothing_is_written(
-    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_written_is_refused_and_nothing_is_written(block: Ran, tmp_path: Path, capsys: Capture) -> None:
     source, model = str(block), f"{tmp_path / 'model'}/"
     assert "known" not in refused(capsys, source, str(tmp_path / "a.dxf"))
     assert "geopackage (.gpkg)" in refused(capsys, source, str(tmp_path / "a.dxf"))
@@ -463,3 +444,110 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_written(
     assert main(["convert", source, model, "-q", "--force"]) == 0
     assert main(["convert", source, str(tmp_path / "table.txt"), "--to", "orthority", "-q"]) == 0
     assert len(table(tmp_path / "table.txt")) == len(block.document["photos"])
+
+
+FRAMES = {"map": UTM, "geographic": "EPSG:4979", "geocentric": "geocentric"}
+NAMES = ("extrinsics.csv", "intrinsics.csv", "sparse_pointcloud.laz")
+ANGLES, PLACE = ("omega", "phi", "kappa"), ("lon", "lat", "alt")
+FORMAT = (13.2, 8.8)  # mm
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ran]:
+    """One block, in three frames."""
+    folder = tmp_path_factory.mktemp("runs")
+    found = {"map": ran(folder, ground={"crs": UTM, "center_deg": [13.5, 49.2]})}
+    for name in ("geographic", "geocentric"):
+        asked = ("--set", f"output.crs={FRAMES[name]}")
+        assert main(["run", str(folder / "project" / "project.yaml"), "-o", str(folder / name), "-q", *asked]) == 0
+        document = read_result(str(folder / name / "result.json"))
+        found[name] = Ran(folder / name, document)
+    return found
+
+
+def projected(camera: Document, opk: Floats, ray: Floats) -> Floats:
+    """Give pixels from the corner, y down, by the camera of a submission; ray: in the axes of the angles."""
+    x, y, z = (ray @ Rotation.from_euler("XYZ", opk, degrees=True).as_matrix()).T
+    x, y = -x / z, y / z
+    k1, k2, k3, p1, p2 = (float(camera[name]) for name in ("k1", "k2", "k3", "p1", "p2"))
+    square = x**2 + y**2
+    radial = 1 + square * (k1 + square * (k2 + square * k3))
+    right = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x**2)
+    down = y * radial + 2 * p2 * x * y + p1 * (square + 2 * y**2)
+    focal, pixel, x0, y0 = (
+        float(camera[each]) for each in ("focal_length", "pixel_pitch", "principal_point_x_mm", "principal_point_y_mm")
+    )
+    width, height = FORMAT
+    return np.stack([width / 2 + focal * right + x0, height / 2 + focal * down - y0], axis=-1) / pixel
+
+
+def level(lon: float, lat: float) -> Floats:
+    """Give true east, north and the normal as rows."""
+    (sl, sp), (cl, cp) = np.sin(np.radians([lon, lat])), np.cos(np.radians([lon, lat]))
+    return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_a_submission_projects_its_point_cloud_onto_the_adjusted_image_points(
+    runs: dict[str, Ran], frame: str, tmp_path: Path, capsys: Capture
+) -> None:
+    """By longitude, latitude, height; by a map as far as it is told."""
+    capsys.readouterr()
+    assert main(["convert", str(runs[frame]), str(tmp_path / NAMES[0])]) == 0
+    said = capsys.readouterr().out
+    rows, (camera,) = (table(tmp_path / each) for each in NAMES[:2])
+    places = np.array(laspy.read(tmp_path / NAMES[2]).xyz)
+    true = adjusted_image_points(runs["map"].document)
+    row_of = {each["id"]: row for row, each in enumerate(runs["map"].document["points"])}
+    away = []
+    for row in nonempty(rows):
+        mine = {point: place for (photo, point), place in true.items() if photo == row["image_file_name"]}
+        some = places[[row_of[each] for each in mine]]
+        opk, at = (np.array([float(row[each]) for each in names]) for names in (ANGLES, PLACE))
+        if frame == "map":
+            ray = some - [float(row[each]) for each in ("x_map", "y_map", "alt")]
+        else:
+            ray = (geocentric("EPSG:4979", some) - geocentric("EPSG:4979", at[None])) @ level(at[0], at[1]).T
+        away.append(np.linalg.norm(projected(camera, opk, ray) - list(mine.values()), axis=1).max())
+    assert len(rows) == 12
+    if frame == "map":
+        assert number_in(said, r"by up to ([\d.]+) px") == pytest.approx(max(away), abs=0.01)
+    else:
+        assert max(away) < 0.01
+        assert "Cartesian" not in said
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_laspy_reads_the_points_and_their_reference_system(runs: dict[str, Ran], frame: str, tmp_path: Path) -> None:
+    assert main(["convert", str(runs[frame]), str(tmp_path / NAMES[0]), "-q"]) == 0
+    cloud = laspy.read(tmp_path / NAMES[2])
+    found = np.array([[each[axis] for axis in "xyz"] for each in runs["map"].document["points"]])
+    crs = UTM if frame == "map" else "EPSG:4979"
+    assert geocentric(crs, np.array(cloud.xyz)) == pytest.approx(geocentric(UTM, found), abs=2e-3)
+    assert cloud.header.parse_crs() == CRS(UTM if frame == "map" else "EPSG:4326")
+    assert cloud.header.are_points_compressed
+    before = (tmp_path / NAMES[2]).read_bytes()
+    assert main(["convert", str(runs[frame]), str(tmp_path / "again_extrinsics.csv"), "-q"]) == 0
+    assert (tmp_path / f"again_{NAMES[2]}").read_bytes() == before
+
+
+def test_what_historix_cannot_take_is_refused(runs: dict[str, Ran], tmp_path: Path, capsys: Capture) -> None:
+    target = str(tmp_path / NAMES[0])
+    assert "write NAME_extrinsics.csv" in refused(capsys, str(runs["map"]), f"{tmp_path}/a.csv", "--to", "historix")
+    assert "longitude and latitude" in refused(capsys, str(ran(tmp_path / "local")), target)
+    document = json.loads((runs["map"].folder / "result.json").read_text(encoding="utf-8"))
+    for key, column in document["cameras"].items():
+        column.append({"id": "other", "single_photos": [document["photos"]["id"][0]]}.get(key, column[0]))
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    assert "takes one camera, and the photos have" in refused(capsys, str(tmp_path / "result.json"), target)
+
+
+def test_without_laspy_the_extra_is_named_before_anything_is_computed(
+    runs: dict[str, Ran], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "lazrs", None)
+    told = refused(capsys, str(runs["map"]), str(tmp_path / NAMES[0]))
+    assert "a point cloud (LAZ) needs laspy with lazrs, which are not installed; pip install photostrip[laz]" in told
+    project = str(runs["map"].folder.parent / "project" / "project.yaml")
+    assert main(["check", project, "--set", "export=[T_extrinsics.csv]"]) == 2
+    assert "pip install photostrip[laz]" in re.sub(r"\s+", " ", capsys.readouterr().out)

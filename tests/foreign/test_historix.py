@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.result_json import read_result
+from tests.calls import Capture
 from tests.foreign.converting import convert, refused
 from tests.foreign.historix_blocks import FILES, OPTIONS, copied, plane, simulated, with_ties
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.mark.slow
@@ -36,7 +34,7 @@ def test_casa_grande_runs_with_tie_points_on_its_stations(tmp_path: Path) -> Non
     assert np.abs(normed).max() < 4.0
 
 
-def test_the_camera_keeps_its_numbers_and_its_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_camera_keeps_its_numbers_and_its_marks(tmp_path: Path, capsys: Capture) -> None:
     assert convert(copied(tmp_path / "historix"), tmp_path / "block", *OPTIONS) == 0
     text = (tmp_path / "block" / "project.yaml").read_text(encoding="utf-8")
     assert "    principal_distance: 152.865\n    principal_point: [-0.03, -0.001]\n    format: [250.0, 250.0]\n" in text
@@ -52,9 +50,6 @@ def test_the_camera_keeps_its_numbers_and_its_marks(tmp_path: Path, capsys: pyte
     assert rows[1] == "ARBCSRD00010006.tif,cg01,4703.34,2196.9"
 
 
-# ---------------------------------------------------------------------------------------------------- refusals
-
-
 @pytest.mark.parametrize(
     ("missing", "expected"),
     [
@@ -63,9 +58,7 @@ def test_the_camera_keeps_its_numbers_and_its_marks(tmp_path: Path, capsys: pyte
         ("--crs", f"{FILES[2]}: --crs: nothing says in which frame the control lies; give --crs"),
     ],
 )
-def test_what_the_files_do_not_carry_is_asked_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], missing: str, expected: str
-) -> None:
+def test_what_the_files_do_not_carry_is_asked_for(tmp_path: Path, capsys: Capture, missing: str, expected: str) -> None:
     place = OPTIONS.index(missing)
     options = OPTIONS[:place] + OPTIONS[place + 2 :]
     assert expected in refused(capsys, copied(tmp_path / "historix"), tmp_path / "block", *options)
@@ -102,7 +95,7 @@ WRONG: dict[str, tuple[str, str, str, str]] = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_refused_with_its_place(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_what_is_wrong_is_refused_with_its_place(tmp_path: Path, capsys: Capture, name: str) -> None:
     file, old, new, expected = WRONG[name]
     source = copied(tmp_path / "historix")
     text = (source / file).read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,20 +12,17 @@ import yaml
 from pyproj import Transformer
 
 import photostrip
+from photostrip.arrays import Floats
 from photostrip.geometry.rotation import from_angles
+from photostrip.notes import Document
 from photostrip.project.check import check_project
 from photostrip.result.table import rows_of
+from tests.calls import Capture
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
 from tests.foreign.metashape_models import SCALE, UTM, cameras, document, label_of, markers, simulated
 from tests.loops import nonempty
 from tests.results import rotation
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Document
 
 CONTROL = {"layout": "random", "count": 8, "sigma": [0.01, 0.01, 0.015], "check": 25}
 
@@ -63,12 +60,7 @@ def run(project: Path) -> dict[str, dict[str, Document]]:
     return {table: {each["id"]: each for each in result.document[table]} for table in ("points", "photos")}
 
 
-# ----------------------------------------------------------------------------------------------------- results
-
-
-def test_markers_come_back_to_the_result_of_the_native_project(
-    tmp_path: Path, chunk: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_markers_come_back_to_the_result_of_the_native_project(tmp_path: Path, chunk: Path, capsys: Capture) -> None:
     assert convert(chunk, tmp_path / "block", "--control", str(chunk)) == 0
     said = capsys.readouterr().out
     assert "Metashape cameras: 12 photos of 1 camera, 0 points, 0 rays" in said
@@ -141,7 +133,7 @@ def small(*changes: tuple[str, str]) -> str:
     return text
 
 
-def test_what_markers_say_of_themselves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_markers_say_of_themselves(tmp_path: Path, capsys: Capture) -> None:
     loose = '<location camera_id="1" pinned="true" x="1000" y="802"/>'
     source = tmp_path / "cameras.XML"
     source.write_text(small((loose, loose.replace("true", "false"))), encoding="utf-8")
@@ -159,7 +151,7 @@ def test_what_markers_say_of_themselves(tmp_path: Path, capsys: pytest.CaptureFi
     assert rows[1:4] == ["DJI_0,G1,900.0,800.0", "DJI_1,G1,1000.0,800.0", "DJI_0,G2,900.0,801.0"]
 
 
-def test_references_of_cameras_are_their_positions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_references_of_cameras_are_their_positions(tmp_path: Path, capsys: Capture) -> None:
     source = tmp_path / "cameras.xml"
     off = 'z="411" sx="1" sy="1" sz="2" enabled="true"'
     source.write_text(small((off, off.replace("true", "false"))), encoding="utf-8")
@@ -169,9 +161,6 @@ def test_references_of_cameras_are_their_positions(tmp_path: Path, capsys: pytes
         "photo,x,y,z,sx,sy,sz",
         "DJI_0,15.3,49.2,410.0,1.0,1.0,2.0",
     ]
-
-
-# ---------------------------------------------------------------------------------------------------- refusals
 
 
 MARK = '<location camera_id="1" pinned="true" x="1000" y="800"/>'
@@ -207,7 +196,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("kind", WRONG)
-def test_what_is_wrong_is_refused(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_wrong_is_refused(tmp_path: Path, kind: str, capsys: Capture) -> None:
     change, words = WRONG[kind]
     source = tmp_path / "cameras.xml"
     source.write_text(small(change), encoding="utf-8")

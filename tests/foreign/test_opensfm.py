@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 from pyproj import Transformer
 
-import photostrip
 from photostrip.project.check import check_project
+from tests.calls import Capture
 from tests.foreign.colmap_models import simulated, small_model
-from tests.foreign.converting import convert, refused, with_control
+from tests.foreign.converting import convert, refused, same_points, with_control
 from tests.foreign.opensfm_models import BROWN, ground_control, reconstruction, tracks, write
-from tests.loops import nonempty
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 
 def small() -> tuple[dict[str, Any], str]:
     return reconstruction(small_model()), tracks(small_model())
-
-
-# ----------------------------------------------------------------------------------------------------- results
 
 
 @pytest.mark.parametrize(("version", "packed"), [(0, False), (1, True), (2, False)])
@@ -32,16 +26,10 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
     given = simulated(tmp_path / "native")
     source = write(tmp_path / "opensfm", [reconstruction(given)], tracks(given, version), packed=packed)
     assert convert(source, tmp_path / "block", "-q") == 0
-    project = with_control(tmp_path / "native", tmp_path / "block")
-    assert check_project(project).faults == ()
-    found, known = photostrip.run(project), photostrip.run(tmp_path / "native" / "project.yaml")
-    at, expected = ({each["id"]: each for each in result.document["points"]} for result in (found, known))
-    for name in ("x", "y", "z", "sigma_x", "sigma_z"):
-        ids = [each for each in expected if each[0] in "GK"]
-        assert [at[each][name] for each in ids] == pytest.approx([expected[each][name] for each in ids], abs=3e-4)
+    same_points(with_control(tmp_path / "native", tmp_path / "block"), tmp_path / "native")
 
 
-def test_ground_control_points_come_in_with_their_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ground_control_points_come_in_with_their_marks(tmp_path: Path, capsys: Capture) -> None:
     native = tmp_path / "native"
     given = simulated(native, ground={"crs": "EPSG:32633"})
     source = write(tmp_path / "opensfm", [reconstruction(given)], tracks(given))
@@ -52,13 +40,8 @@ def test_ground_control_points_come_in_with_their_marks(tmp_path: Path, capsys: 
     options = ("--control", str(control), "--control-sigma", "0.01,0.01,0.015")
     assert convert(source, tmp_path / "block", *options) == 0
     assert ", 6 of them check points, 99 marks; EPSG:4979" in capsys.readouterr().out
-    found = photostrip.run(tmp_path / "block" / "project.yaml")
-    known = photostrip.run(native / "project.yaml")
     to_utm = Transformer.from_crs("EPSG:4326", "EPSG:32633", always_xy=True)
-    at, expected = ({each["id"]: each for each in result.document["points"]} for result in (found, known))
-    for point in nonempty([each for each in expected if each[0] in "GK"]):
-        x, y = to_utm.transform(at[point]["x"], at[point]["y"])
-        assert (x, y, at[point]["z"]) == pytest.approx([expected[point][name] for name in "xyz"], abs=3e-4)
+    same_points(tmp_path / "block" / "project.yaml", native, to_map=to_utm.transform)
 
 
 @pytest.mark.parametrize("kind", ["perspective", "simple_radial", "radial"])
@@ -74,8 +57,6 @@ def test_other_cameras_keep_their_numbers(tmp_path: Path, kind: str) -> None:
     assert ("focal_length: 0.7\n" if kind == "perspective" else "focal_length: [0.7, 0.71]") in text
     assert ("k2: -0.002" in text) == (kind != "simple_radial")
 
-
-# ---------------------------------------------------------------------------------------------------- refusals
 
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "fisheye": (
@@ -104,9 +85,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_reconstruction_is_refused_with_its_record(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_a_wrong_reconstruction_is_refused_with_its_record(tmp_path: Path, capsys: Capture, name: str) -> None:
     whole, rays = small()
     change, expected = WRONG[name]
     change(whole)
@@ -116,7 +95,7 @@ def test_a_wrong_reconstruction_is_refused_with_its_record(
     )
 
 
-def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: Capture) -> None:
     write(tmp_path / "site" / "opensfm", [small()[0]], small()[1])
     told = refused(capsys, tmp_path / "site", tmp_path / "block")
     assert "is nothing that is read here; expected a folder with cameras.bin or cameras.txt (COLMAP)" in told
@@ -147,9 +126,7 @@ CONTROL: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
 
 
 @pytest.mark.parametrize("name", CONTROL)
-def test_wrong_control_is_refused_with_its_record(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_wrong_control_is_refused_with_its_record(tmp_path: Path, capsys: Capture, name: str) -> None:
     source = write(tmp_path / "opensfm", [small()[0]], small()[1])
     rays = [{"shot_id": f"DJI {n}.JPG", "projection": [0.01 * n, 0.02]} for n in range(2)]
     place = {"latitude": 49.2, "longitude": 15.3, "altitude": 200.0}

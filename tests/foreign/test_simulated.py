@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import subprocess
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from photostrip.camera import Distortion
 from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.project.loading import load_project
+from photostrip.project.loading import Project, load_project
 from photostrip.result.table import rows_of
 from photostrip.simulation import (
     DIGITAL,
@@ -39,11 +39,6 @@ from tests.results import rotation
 from tests.simulated import inputs_of, settings_of
 from tests.source_tree import ROOT
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.project.loading import Project
-
 NONE = (0.0, 0.0, 0.0)
 FREE = Spec(image=Image(sigma_um=0.0), control=Control(noise=NONE))
 TINY = Spec(
@@ -57,47 +52,6 @@ TINY = Spec(
     film=Film(),
     gross_errors=(GrossError("image", photo="1002", point="1001-4", axis="x"),),
 )
-
-EXPECTED = {  # how they begin
-    "observations.csv": "photo,point,x,y\n1001,G01,-4.6365,90.7383\n1001,G02,-14.3483,6.8065\n",
-    "control.csv": "point,x,y,z,use,role\nG01,-907.9602,881.5598,278.8730,xyz,control\n",
-    "gnss.csv": "photo,x,y,z,sx,sy,sz\n1001,-937.8724,-15.6581,1823.8784,0.1,0.1,0.15\n",
-}
-FIRST_CENTER = [-938.022758, -15.5589382, 1823.6216514]
-PROJECT = """\
-photostrip: 1
-name: "tiny"
-cameras:
-  "film":
-    principal_distance: 153.0
-    principal_point: [0.0, 0.0]
-    format: [230.0, 230.0]
-    fiducials:
-      "F1": [106.0, -106.0]
-      "F2": [-106.0, -106.0]
-      "F3": [-106.0, 106.0]
-      "F4": [106.0, 106.0]
-      "F5": [0.0, -110.0]
-      "F6": [-110.0, 0.0]
-      "F7": [0.0, 110.0]
-      "F8": [110.0, 0.0]
-strips:
-- id: "A"
-  camera: "film"
-  photos: ["1001", "1002", "1003"]
-observations:
-  file: observations.csv
-  unit: mm
-  y_axis: up
-  sigma: 0.005
-fiducial_measurements:
-  file: fiducials.csv
-control:
-- file: control.csv
-  crs: "local"
-  axes: [east, north, up]
-  sigma: [0.05, 0.05, 0.08]
-"""
 
 
 def written(simulation: Simulation, folder: Path) -> Project:
@@ -220,20 +174,6 @@ def test_the_truth_is_written_in_full(name: str) -> None:
     assert abs(control["size_m"]) == 5.0
 
 
-def test_numbers_have_fixed_decimals() -> None:
-    done = simulate(replace(TINY, film=None))
-    files = project_files(done)
-    for name, pattern in {
-        "observations.csv": r"[^,]+,[^,]+(,-?\d+\.\d{4}){2}",
-        "control.csv": r"[^,]+(,-?\d+\.\d{4}){3},xyz,(control|check)",
-        "gnss.csv": r"[^,]+(,-?\d+\.\d{4}){3},0.1,0.1,0.15",
-    }.items():
-        rows = files[name].splitlines()[1:]
-        assert rows
-        assert [row for row in rows if not re.fullmatch(pattern, row)] == []
-    assert "-0.0000" not in "".join(files.values())
-
-
 @pytest.mark.slow
 def test_the_same_specification_gives_the_same_bytes() -> None:
     """In two processes, with different orders of sets and dictionaries of texts."""
@@ -242,33 +182,19 @@ def test_the_same_specification_gives_the_same_bytes() -> None:
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
     )
-    here = digests()
-    assert len(here) > 60
-    assert done.stdout.splitlines() == here
+    assert done.stdout.splitlines() == digests()
 
 
 def digests() -> list[str]:
-    """Give the names and the digests of all files of all variants."""
-    files = [project_files(simulate(spec)) for spec in (TINY, *VARIANTS.values())]
+    """Give the names and the digests of all files of some variants."""
+    specs = TINY, *(VARIANTS[name] for name in ("comparator", "distortion", "two zones", "partly given", "strips"))
+    files = [project_files(simulate(spec)) for spec in specs]
     return [f"{name} {hashlib.sha256(text.encode()).hexdigest()}" for each in files for name, text in each.items()]
 
 
 def test_another_seed_gives_other_files() -> None:
     one, two = (project_files(simulate(replace(TINY, seed=seed))) for seed in (5, 6))
     assert {name for name in one if one[name] != two[name]} == set(one) - {"project.yaml"}
-
-
-def test_a_tiny_project_never_changes() -> None:
-    files = project_files(simulate(TINY))
-    assert list(files) == ["observations.csv", "fiducials.csv", "control.csv", "gnss.csv", "truth.json", "project.yaml"]
-    for name, text in EXPECTED.items():
-        assert files[name].startswith(text)
-    truth = json.loads(files["truth.json"])
-    assert [truth["photos"][axis][0] for axis in "xyz"] == FIRST_CENTER
-    (error,) = rows_of(truth["errors"])
-    known = {key: value for key, value in error.items() if value is not None}
-    assert known == {"kind": "image", "photo": "1002", "point": "K01", "axis": "x", "size_um": 200.0}
-    assert files["project.yaml"] == PROJECT
 
 
 def test_positions_are_named_only_when_they_are_to_be_used() -> None:

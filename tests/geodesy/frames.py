@@ -6,19 +6,16 @@ import csv
 import math
 import struct
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
+from photostrip.arrays import Floats
 from photostrip.errors import InputError
 from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from photostrip.geodesy.ground_frame import GroundFrame
 
 DATA = Path(__file__).parents[1] / "data" / "geodesy"
 ENU = ("east", "north", "up")
@@ -57,17 +54,17 @@ def rows(name: str) -> list[dict[str, float]]:
         return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
 
 
-def columns(table: list[dict[str, float]], *names: str) -> NDArray[np.float64]:
+def columns(table: list[dict[str, float]], *names: str) -> Floats:
     """Give columns of a table as an array; a number stands for itself."""
     return np.array([[row[name] for name in names] for row in table])
 
 
-def with_height(plan: NDArray[np.float64], height: float = 0.0) -> NDArray[np.float64]:
+def with_height(plan: Floats, height: float = 0.0) -> Floats:
     """Append one height to all rows."""
     return np.column_stack([plan, np.full(len(plan), height)])
 
 
-def write_gtx(path: Path, undulation: NDArray[np.float64], *, south: float, west: float, step: float) -> Path:
+def write_gtx(path: Path, undulation: Floats, *, south: float, west: float, step: float) -> Path:
     """Write a geoid grid: rows from south to north, columns from west to east, degrees and metres."""
     head = struct.pack(">ddddii", south, west, step, step, *undulation.shape)
     path.write_bytes(head + undulation.astype(">f4").tobytes())
@@ -75,8 +72,8 @@ def write_gtx(path: Path, undulation: NDArray[np.float64], *, south: float, west
 
 
 def krueger(
-    lonlat_deg: NDArray[np.float64], *, a: float, flattening: float, lon_0: float, k0: float, east_0: float = 500000.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    lonlat_deg: Floats, *, a: float, flattening: float, lon_0: float, k0: float, east_0: float = 500000.0
+) -> tuple[Floats, Floats]:
     """Transverse Mercator by the series of Krueger and Karney, to the sixth order of n: (east, north) and convergence.
 
     Source: C. F. F. Karney, Transverse Mercator with an accuracy of a few nanometers, eq. 7-11, 23-26, 35.

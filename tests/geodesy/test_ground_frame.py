@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,11 +11,17 @@ from hypothesis import strategies as st
 from pyproj import Proj, Transformer
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.local_frame import (
+    IntermediateFrame,
+    axes_matrix,
+    eccentricity_squared,
+    geocentric_from_geodetic,
+    mean_position,
+)
 from photostrip.geodesy.tying import tie_frames
-from tests.geodesy.frames import frame, krueger, spec
-
-if TYPE_CHECKING:
-    from photostrip.geodesy.ground_frame import GroundFrame
+from tests.geodesy.frames import ENU, NEU, columns, frame, krueger, pair, rows, spec, with_height
+from tests.vectors import Vector, cases
 
 MICROMETRE = 1e-6  # m
 NANORADIAN = 1e-9
@@ -126,16 +131,6 @@ def test_convergence_is_that_of_proj(crs: str, u: float, v: float) -> None:
     assert math.remainder(turn, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-7)
 
 
-def test_convergence_has_the_sign_of_the_textbooks() -> None:
-    """North-east of the central meridian grid north lies east of true north."""
-    xyz = np.vstack([cartesian(UTM33, np.array([lon, lat, 0.0])) for lon, lat in ((17, 50), (13, 50), (17, -50))])
-    found = UTM33.convergence(xyz)
-    assert found == pytest.approx(np.radians([2.0, -2.0, -2.0]) * math.sin(math.radians(50.0)), abs=1e-4)
-
-
-# ------------------------------------------------------------------------------- units, bodies, differences
-
-
 @given(
     lon=st.floats(-180.0, 180.0),
     lat=st.floats(-89.0, 89.0),
@@ -148,9 +143,6 @@ def test_differences_of_longitudes_and_latitudes_are_metres(lon: float, lat: flo
     found = grid.difference(there, [[lon, lat, 300.0]])[0]
     # The curvature of the meridian and the convergence of two meridians over 50 m are all that may remain.
     assert found == pytest.approx(shift, abs=0.01 / math.cos(math.radians(lat)))
-
-
-# ------------------------------------------------------------------------------------------ orders of axes
 
 
 @pytest.mark.parametrize(
@@ -174,17 +166,11 @@ def test_order_of_columns(crs: str, axes: tuple[str, str, str], order: tuple[int
     assert (user[..., np.argsort(grid.order)] == internal).all()
 
 
-# ------------------------------------------------------------------------------------------- local frames
-
-
 def test_the_curvature_of_a_level_lake_bends_it_away_from_the_tangent_plane() -> None:
     """An independent case for the sign: points at one height, 10 km away, lie 7.8 m below the plane."""
     grid = frame("local", curvature_radius=6376234.66).with_origin((0.0, 0.0))
     lake = grid.cartesian_from_ground([[0.0, 0.0, 100.0], [10000.0, 0.0, 100.0], [0.0, -10000.0, 100.0]])
     assert lake[:, 2] == pytest.approx((100.0, 92.16, 92.16), abs=0.005)
-
-
-# ------------------------------------------------------------------------------------------- the rim of the world
 
 
 def test_points_outside_the_domain_are_named() -> None:
@@ -214,3 +200,87 @@ def test_a_polar_grid_works_at_its_pole() -> None:
         assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
         with pytest.raises(GeometryError, match="row 0: at a pole there is no east and no north"):
             grid.convergence(xyz)
+
+
+GIGS = 0.03  # m, tolerance of the GIGS projection tests
+GIGS_GEOCENTRIC = 0.01  # m
+MILLIMETRE = 1e-3
+CENTIMETRE = 1e-2
+
+OSGB_ON_WGS84 = "+proj=tmerc +lat_0=49 +lon_0=-2 +k=0.9996012717 +x_0=400000 +y_0=-100000 +datum=WGS84"
+PROJECTIONS = [
+    pytest.param("gigs5101_1_tm_osgb_params_on_wgs84.csv", OSGB_ON_WGS84, "+proj=longlat +datum=WGS84", id="tm-osgb"),
+    pytest.param("gigs5101_2_utm31_wgs84.csv", "EPSG:32631", "EPSG:4326", id="utm31"),
+    pytest.param("gigs5101_3_mga54_grs80.csv", "EPSG:28354", "EPSG:4283", id="mga54"),
+]
+
+
+@pytest.mark.parametrize(("table", "crs", "geographic"), PROJECTIONS)
+def test_gigs_projections_there_and_back(table: str, crs: str, geographic: str) -> None:
+    data = rows(table)
+    assert len(data) >= 23
+    lonlat, plan = columns(data, "lon_deg", "lat_deg"), columns(data, "E_m", "N_m")
+    given_frame, output = pair(geographic, crs)
+    there = given_frame.cartesian_from_ground(with_height(lonlat))
+    found = output.ground_from_cartesian(there)
+    assert np.abs(found[:, :2] - plan).max() < GIGS
+    assert np.abs(found[:, 2]).max() < MILLIMETRE
+    assert np.linalg.norm(output.cartesian_from_ground(with_height(plan)) - there, axis=1).max() < GIGS
+
+
+def test_gigs_geocentric_there_and_back() -> None:
+    data = rows("gigs5201_geocentric_geographic.csv")
+    geocentric, output = pair("geocentric", "EPSG:4979")
+    xyz, lonlath = columns(data, "X_m", "Y_m", "Z_m"), columns(data, "lon_deg", "lat_deg", "h_m")
+    assert np.abs(output.cartesian_from_ground(lonlath) - xyz).max() < GIGS_GEOCENTRIC
+    found = output.ground_from_cartesian(geocentric.cartesian_from_ground(xyz))
+    assert np.abs(output.difference(found, lonlath)).max() < GIGS_GEOCENTRIC
+
+
+def test_epsg_topocentric() -> None:
+    origin = np.array([3652755.3058, 319574.6799, 5201547.3536])  # 55 N, 5 E, 200 m
+    north_west_up = IntermediateFrame(origin, axes_matrix(np.radians(55.0), np.radians(5.0), 0.0))
+    xyz = frame("EPSG:4979").cartesian_from_ground([[2.12955, 53.80939444444444, 73.0]])
+    for point in ([3771793.968, 140253.342, 5124304.349], xyz[0]):
+        x, y, z = north_west_up.intermediate_from_cartesian(point)
+        assert (-y, x, z) == pytest.approx((-189013.869, -128642.040, -4220.171), abs=2 * MILLIMETRE)
+
+
+@pytest.mark.parametrize("example", cases("gauss_kruger"))
+def test_gauss_krueger_vectors(example: Vector) -> None:
+    given = example.input
+    ellipsoid = "+ellps=krass" if given["ellipsoid"].startswith("Krasovsky") else "+ellps=GRS80"
+    crs = f"+proj=tmerc +lon_0={given['L0_deg']} +k={given['k0']} +x_0={given['false_easting']} {ellipsoid}"
+    geographic, grid = pair(f"+proj=longlat {ellipsoid}", spec(crs, axes=NEU))
+    found = grid.ground_from_cartesian(geographic.cartesian_from_ground([[given["L_deg"], given["B_deg"], 0.0]]))
+    expected = (example.expected["x_north"], example.expected["y_east"])
+    assert grid.user_from_internal(found)[0, :2] == pytest.approx(expected, abs=example.tol["abs_m"], rel=0.0)
+
+
+@pytest.mark.parametrize("example", cases("geodesy_intermediate"))
+def test_geocentric_and_intermediate_vectors(example: Vector) -> None:
+    points = np.array(example.input["points_B_deg_L_deg_H_m"])
+    crs = "+proj=longlat +ellps=krass" if "Krasovsky" in example.input["ellipsoid"] else "+proj=longlat +ellps=GRS80"
+    expected, tol = example.expected, example.tol
+    ground = frame(crs, axes=("north", "east", "up"))
+    xyz = ground.cartesian_from_ground(points[..., np.argsort(ground.order)])
+    assert np.abs(xyz - expected["geocentric"]).max() < tol["geocentric_m"]
+
+    lat, lon, height = mean_position(np.radians(points[:, 0]), np.radians(points[:, 1]), points[:, 2])
+    assert np.degrees([lat, lon]) == pytest.approx(expected["B0_L0_H0"][:2], abs=1e-12)
+    assert height == pytest.approx(expected["B0_L0_H0"][2])
+    local = IntermediateFrame.at_centre(xyz, lat, lon, np.radians(example.input["A0_deg"]))
+    assert local.origin == pytest.approx(expected["X0_Y0_Z0_geocentric"], abs=tol["geocentric_m"])
+    assert np.abs(local.axes - expected["M_columns_are_axes"]).max() < tol["cosines"]
+    assert np.linalg.det(local.axes) == pytest.approx(expected["determinant"])
+    assert np.abs(local.intermediate_from_cartesian(xyz) - expected["intermediate"]).max() < tol["intermediate_m"]
+    assert np.abs(local.cartesian_from_intermediate(expected["intermediate"]) - xyz).max() < tol["intermediate_m"]
+
+
+def test_the_ellipsoids_of_proj_are_those_of_the_literature() -> None:
+    for name, a, flattening in (("krass", 6378245.0, 298.3), ("GRS80", 6378137.0, 298.257222101)):
+        found = frame(f"+proj=longlat +ellps={name}", axes=ENU).ellipsoid
+        assert found is not None
+        assert found[0] == a
+        assert eccentricity_squared(found) == pytest.approx(2 / flattening - 1 / flattening**2, rel=1e-12)
+        assert geocentric_from_geodetic([[0.0, np.pi / 2, 0.0]], found)[0, 2] == pytest.approx(found[1])

@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
+from photostrip.pipeline.run import triangulate
+from photostrip.simulation import Flight, Ground, Spec
+from photostrip.simulation.simulation import simulate
 from tests.geodesy.frames import frame, pair, refused, spec, write_gtx
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.geodesy.frame_spec import FrameSpec
+from tests.simulated import inputs_of, settings_of
 
 MICROMETRE = 1e-6  # m
 ARC_SECOND = math.pi / 180.0 / 3600.0
 UTM33 = np.array([[500000.0, 5000000.0, 100.0], [501000.0, 4999000.0, 250.0]])
 BULGARIA = "+proj=tmerc +lon_0=27 +x_0=500000 +ellps=krass +towgs84=23.57,-140.95,-79.8,0,0.35,0.79,-0.22"
 PULKOVO = np.array([[370000.0, 4710000.0, 550.0], [371000.0, 4713000.0, 700.0]])
-
-# --------------------------------------------------------------------------------------------- one datum
 
 
 def test_the_output_is_the_first_control_list_unless_it_is_given() -> None:
@@ -54,9 +56,6 @@ def test_within_one_datum_nothing_is_shifted(first: str, second: str) -> None:
     for given, output in (pair(first, second), pair(second, first)):
         assert (given.datum_shift, given.datum_accuracy) == ("", 0.0)
         assert "datum shift" not in given.describe() + output.describe()
-
-
-# ------------------------------------------------------------------------------------------ between datums
 
 
 def helmert(xyz: np.ndarray, towgs84: tuple[float, ...]) -> np.ndarray:
@@ -100,36 +99,124 @@ def test_all_points_of_a_datum_are_shifted_by_one_operation() -> None:
 @pytest.mark.parametrize(
     ("first", "second", "reason"),
     [
-        (
-            "+proj=tmerc +lon_0=27 +ellps=krass",
-            "EPSG:32635",
-            (
-                "+proj=tmerc +lon_0=27 +ellps=krass to that of EPSG:32635: +proj=tmerc +lon_0=27 +ellps=krass states an"
-                " ellipsoid but no datum; add +towgs84=... (or +datum=...) to it, or use an authority code"
-            ),
-        ),
-        (
-            "IAU_2015:30110",
-            "EPSG:32635",
-            "IAU_2015:30110 to that of EPSG:32635: they lie on different bodies; give both in one datum",
-        ),
+        ("+proj=tmerc +lon_0=27 +ellps=krass", "EPSG:32635", "states an ellipsoid but no datum; add +towgs84=... (or"),
+        ("IAU_2015:30110", "EPSG:32635", "they lie on different bodies; give both in one datum"),
         (
             "+proj=utm +zone=33 +ellps=bessel +nadgrids=@nowhere.gsb",
             "EPSG:32633",
-            (
-                "+proj=utm +zone=33 +ellps=bessel +nadgrids=@nowhere.gsb to that of EPSG:32633: the grid nowhere.gsb"
-                " is not installed; put the grid beside the project file or into PROJ's data directory (`projsync`),"
-                " or give both in one datum"
-            ),
+            "the grid nowhere.gsb is not installed; put the grid beside the project file or into PROJ's data directory",
         ),
     ],
 )
 def test_datums_without_a_sound_way_between_them(first: str, second: str, reason: str) -> None:
-    expected = f"control[0].crs: there is no known way from the datum of {reason}"
-    assert refused(first, output=spec(second)) == [expected]
+    (told,) = refused(first, output=spec(second))
+    assert told.startswith(f"control[0].crs: there is no known way from the datum of {first} to that of {second}: ")
+    assert reason in told
 
 
-# ------------------------------------------------------------------------------------------------- heights
+NO_GRID = (
+    "put the grid beside the project file or into PROJ's data directory (`projsync`), or give the CRS without heights"
+)
+KINDS = "expected a projected, geographic or geocentric CRS, with heights or without"
+SIGNS = "use the east-north form of the grid, with the signs of the coordinates changed"
+# what is described, the key of the fault, what is said of it and the cure
+REFUSED = [
+    (spec("EPSG:32633+5773", height="orthometric"), "crs", "geoid grid us_nga_egm96_15.tif is not installed", NO_GRID),
+    (spec("EPSG:28405+5705", height="orthometric"), "crs", "(Baltic 1977 height) cannot be brought", NO_GRID),
+    (
+        spec("+proj=utm +zone=33 +datum=WGS84 +geoidgrids=nowhere.gtx", height="orthometric"),
+        "crs",
+        "the geoid grid nowhere.gtx is not installed",
+        NO_GRID,
+    ),
+    (
+        spec("EPSG:32633", height="orthometric"),
+        "height",
+        "does not say how high the geoid lies above the ellipsoid",
+        "expected geoid_undulation: metres, or a vertical CRS in `crs` (such as EPSG:32633+5773)",
+    ),
+    (
+        spec("EPSG:32633+5773"),
+        "height",
+        "brings heights above a geoid (EGM96 height), but they are said to be ellipsoidal",
+        "say `height: orthometric`, or leave the vertical part out of `crs`",
+    ),
+    (
+        spec("EPSG:32633+5773", height="orthometric", geoid_undulation=40.0),
+        "geoid_undulation",
+        "brings its own geoid (EGM96 height), and geoid_undulation is given as well",
+        "drop `geoid_undulation`, or the vertical part of `crs`",
+    ),
+    (
+        spec("EPSG:4979", height="orthometric", geoid_undulation=40.0),
+        "height",
+        "are ellipsoidal by definition, but they are said to be orthometric",
+        "use the two-dimensional CRS with `geoid_undulation`, or a compound CRS",
+    ),
+    (
+        spec("EPSG:32633", geoid_undulation=40.0),
+        "geoid_undulation",
+        "its heights are said to be ellipsoidal",
+        "drop it, or say `height: orthometric`",
+    ),
+    (
+        spec("EPSG:32633", height="above sea level"),
+        "height",
+        "height: above sea level is not understood",
+        "expected ellipsoidal or orthometric",
+    ),
+    (spec("EPSG:2053"), "crs", "the axes of EPSG:2053 point west and south", SIGNS),
+    (spec('LOCAL_CS["site",UNIT["metre",1]]'), "crs", "of the kind 'Engineering CRS'", KINDS),
+    (spec("EPSG:5703"), "crs", "of the kind 'Vertical CRS'", KINDS),
+    (
+        spec("IAU_2015:49902"),
+        "crs",
+        "planetocentric latitudes'",
+        "use geodetic latitudes (a PROJ string with +a and +b)",
+    ),
+    (spec("+init=epsg:32633"), "crs", "PROJ has given up `+init=`", "expected a code such as EPSG:32633"),
+    (spec(" "), "crs", "no coordinate reference system is given", "expected an authority code (EPSG:32633)"),
+    (
+        spec("EPSG:99999"),
+        "crs",
+        "PROJ does not know the coordinate reference system 'EPSG:99999'",
+        "write `crs: local`",
+    ),
+    (
+        spec("EPSG:4326", axes=("lat", "lon", "h")),
+        "axes",
+        "axes [lat, lon, h] of EPSG:4326 are not understood",
+        "expected a permutation of [east, north, up]; longitude is east, latitude is north",
+    ),
+    (
+        spec("geocentric", axes=("x", "y", "y")),
+        "axes",
+        "axes [x, y, y] of geocentric (WGS 84) are not understood",
+        "expected a permutation of [x, y, z] or of [east, north, up]",
+    ),
+    (
+        spec("EPSG:32633", ellipsoid=(6378245.0, 6356863.019)),
+        "ellipsoid",
+        "`ellipsoid` belongs to `crs: geocentric`; EPSG:32633 has its own or none",
+        "drop `ellipsoid`, or write the radii into a PROJ string (+a=... +b=...)",
+    ),
+    (
+        spec("geocentric", ellipsoid=(6378245.0, 298.3)),
+        "ellipsoid",
+        "a = 6378245.0, b = 298.3 are not the semi-axes of an ellipsoid",
+        "expected both semi-axes in metres, for example a: 6378245, b: 6356863.019",
+    ),
+]
+
+
+@pytest.mark.parametrize(("description", "key", "said", "cure"), REFUSED)
+def test_what_describes_no_frame_is_refused_with_the_way_out(
+    description: FrameSpec, key: str, said: str, cure: str
+) -> None:
+    (told,) = refused(description)
+    assert told.startswith(f"control[0].{key}: ")
+    assert said in told
+    assert cure in told[told.index(said) :]
 
 
 def test_a_constant_undulation_lifts_heights_to_the_ellipsoid() -> None:
@@ -174,31 +261,6 @@ def test_points_outside_a_geoid_grid_are_named(geoid: Path) -> None:
         grid.ground_from_cartesian(xyz)
 
 
-NO_GRID = (
-    "; put the grid beside the project file or into PROJ's data directory (`projsync`), or give the CRS without heights"
-    " and a constant `geoid_undulation`"
-)
-
-
-@pytest.mark.parametrize(
-    ("crs", "reason"),
-    [
-        (
-            "EPSG:32633+5773",
-            "(EGM96 height) cannot be brought to the ellipsoid: the geoid grid us_nga_egm96_15.tif is not installed",
-        ),
-        ("EPSG:28405+5705", "(Baltic 1977 height) cannot be brought to the ellipsoid: PROJ knows no geoid for them"),
-        (
-            "+proj=utm +zone=33 +datum=WGS84 +geoidgrids=nowhere.gtx",
-            "(geoid grid nowhere.gtx) cannot be brought to the ellipsoid: the geoid grid nowhere.gtx is not installed",
-        ),
-    ],
-)
-def test_a_geoid_that_is_not_there_is_refused_by_name(crs: str, reason: str) -> None:
-    expected = f"control[0].crs: the heights of {crs} {reason}{NO_GRID}"
-    assert refused(spec(crs, height="orthometric")) == [expected]
-
-
 def test_a_file_that_is_no_grid_is_refused(tmp_path: Path) -> None:
     (tmp_path / "broken.gtx").write_text("this is not a grid", encoding="utf-8")
     crs = f"+proj=utm +zone=33 +datum=WGS84 +geoidgrids={tmp_path / 'broken.gtx'}"
@@ -206,155 +268,6 @@ def test_a_file_that_is_no_grid_is_refused(tmp_path: Path) -> None:
         InputError, match=r"PROJ cannot read the grid|outside the geoid grid"
     ):  # it says so late, or early
         frame(crs, height="orthometric").cartesian_from_ground(UTM33)
-
-
-@pytest.mark.parametrize(
-    ("description", "expected"),
-    [
-        (
-            spec("EPSG:32633", height="orthometric"),
-            (
-                "control[0].height: EPSG:32633 with orthometric heights does not say how high the geoid lies above the"
-                " ellipsoid; expected geoid_undulation: metres, or a vertical CRS in `crs` (such as EPSG:32633+5773);"
-                " a constant undulation does for a strip of a few kilometres"
-            ),
-        ),
-        (
-            spec("EPSG:32633+5773"),
-            (
-                "control[0].height: EPSG:32633+5773 brings heights above a geoid (EGM96 height), but they are said to"
-                " be ellipsoidal; say `height: orthometric`, or leave the vertical part out of `crs`"
-            ),
-        ),
-        (
-            spec("EPSG:32633+5773", height="orthometric", geoid_undulation=40.0),
-            (
-                "control[0].geoid_undulation: EPSG:32633+5773 brings its own geoid (EGM96 height), and"
-                " geoid_undulation is given as well; drop `geoid_undulation`, or the vertical part of `crs`"
-            ),
-        ),
-        (
-            spec("EPSG:4979", height="orthometric", geoid_undulation=40.0),
-            (
-                "control[0].height: the heights of EPSG:4979 are ellipsoidal by definition, but they are said to be"
-                " orthometric; use the two-dimensional CRS with `geoid_undulation`, or a compound CRS"
-            ),
-        ),
-        (
-            spec("EPSG:32633", geoid_undulation=40.0),
-            (
-                "control[0].geoid_undulation: geoid_undulation is given for EPSG:32633, but its heights are said to be"
-                " ellipsoidal; drop it, or say `height: orthometric`"
-            ),
-        ),
-        (
-            spec("EPSG:32633", height="above sea level"),
-            "control[0].height: height: above sea level is not understood; expected ellipsoidal or orthometric",
-        ),
-    ],
-)
-def test_one_statement_about_heights_and_one_only(description: FrameSpec, expected: str) -> None:
-    assert refused(description) == [expected]
-
-
-# --------------------------------------------------------------------------------------------- other refusals
-
-KINDS = "expected a projected, geographic or geocentric CRS, with heights or without"
-OWN = "for a system of your own write `crs: local` (right-handed, metres)"
-EAST_NORTH = (
-    "expected axes that point east and north, in any order; use the east-north form of the grid, with the signs of the"
-    " coordinates changed"
-)
-
-
-@pytest.mark.parametrize(
-    ("crs", "expected"),
-    [
-        ("EPSG:2053", f"the axes of EPSG:2053 point west and south; {EAST_NORTH}"),
-        (
-            'LOCAL_CS["site",UNIT["metre",1]]',
-            (
-                'LOCAL_CS["site",UNIT["metre",1]] cannot carry ground control: it is of the kind '
-                f"'Engineering CRS'; {KINDS}; {OWN}"
-            ),
-        ),
-        ("EPSG:5703", f"EPSG:5703 cannot carry ground control: it is of the kind 'Vertical CRS'; {KINDS}; {OWN}"),
-        (
-            "IAU_2015:49902",
-            (
-                "IAU_2015:49902 cannot carry ground control: it is of the kind 'Geodetic CRS with planetocentric"
-                f" latitudes'; {KINDS}; use geodetic latitudes (a PROJ string with +a and +b), or `geocentric` with"
-                f" `ellipsoid`"
-            ),
-        ),
-        ("+init=epsg:32633", "+init=epsg:32633: PROJ has given up `+init=`; expected a code such as EPSG:32633"),
-        (
-            " ",
-            (
-                "no coordinate reference system is given; expected an authority code (EPSG:32633), a PROJ string, WKT,"
-                " `geocentric` or `local`"
-            ),
-        ),
-    ],
-)
-def test_a_crs_that_cannot_be_used(crs: str, expected: str) -> None:
-    assert refused(crs) == [f"control[0].crs: {expected}"]
-
-
-def test_a_crs_that_proj_does_not_know() -> None:
-    (found,) = refused("EPSG:99999")
-    assert found.startswith(
-        "control[0].crs: PROJ does not know the coordinate reference system 'EPSG:99999' (crs not fou"
-    )
-    assert found.endswith(
-        "; expected an authority code (EPSG:32633), a PROJ string, WKT, `geocentric` or `local`; for a system of your"
-        " own write `crs: local` (right-handed, metres)"
-    )
-
-
-@pytest.mark.parametrize(
-    ("description", "expected"),
-    [
-        (
-            spec("EPSG:4326", axes=("lat", "lon", "h")),
-            (
-                "control[0].axes: axes [lat, lon, h] of EPSG:4326 are not understood; expected a permutation of"
-                " [east, north, up]; longitude is east, latitude is north"
-            ),
-        ),
-        (
-            spec("geocentric", axes=("x", "y", "y")),
-            (
-                "control[0].axes: axes [x, y, y] of geocentric (WGS 84) are not understood; expected a permutation of"
-                " [x, y, z] or of [east, north, up]"
-            ),
-        ),
-        (
-            spec("EPSG:32633", curvature_radius=6.37e6),
-            (
-                "control[0].crs: the curvature correction of eq. 153 is asked for, but EPSG:32633 carries the curvature"
-                " already: it would count twice; drop `earth_curvature: model`, or give plane coordinates of an unknown"
-                " projection as `crs: local`"
-            ),
-        ),
-        (
-            spec("EPSG:32633", ellipsoid=(6378245.0, 6356863.019)),
-            (
-                "control[0].ellipsoid: `ellipsoid` belongs to `crs: geocentric`; EPSG:32633 has its own or none; drop"
-                " `ellipsoid`, or write the radii into a PROJ string (+a=... +b=...)"
-            ),
-        ),
-        (
-            spec("geocentric", ellipsoid=(6378245.0, 298.3)),
-            (
-                "control[0].ellipsoid: a = 6378245.0, b = 298.3 are not the semi-axes of an ellipsoid; expected both"
-                " semi-axes in metres, for example a: 6378245, b: 6356863.019"
-            ),
-        ),
-    ],
-)
-def test_keys_that_do_not_belong_together(description: FrameSpec, expected: str) -> None:
-    assert refused(description) == [expected]
 
 
 def test_local_and_geodetic_frames_do_not_mix() -> None:
@@ -379,9 +292,6 @@ def test_all_faults_come_at_once_each_at_its_key() -> None:
     assert [line.split(":")[0] for line in grids] == ["control[0].crs", "control[1].crs"]
 
 
-# --------------------------------------------------------------------------------------- what is not loaded
-
-
 def run(program: str, **environment: str) -> str:
     """Run a program in a process of its own and give what it prints."""
     done = subprocess.run(
@@ -400,3 +310,92 @@ import pyproj.network
 print(pyproj.network.is_network_enabled())
 """
     assert run(program, PROJ_NETWORK="ON") == "False"
+
+
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
+ETRS89, ITRF2020 = FrameSpec("EPSG:4937", GROUND_AXES), FrameSpec("EPSG:9989", GROUND_AXES)
+PLACE = np.array([[11.5, 48.2, 500.0]])  # Munich
+METRES_IN_DEGREE = np.array([74_300.0, 111_200.0, 1.0])
+
+
+def moved(spec: FrameSpec, output: FrameSpec) -> np.ndarray:
+    """Bring a place from one frame to another; east, north, up in metres from where it was."""
+    (frame,), target = tie_frames([spec], output)
+    there = target.ground_from_cartesian(frame.cartesian_from_ground(PLACE))
+    return np.asarray((there - PLACE)[0] * METRES_IN_DEGREE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dated", ["list", "output"])
+def test_europe_moves_north_east_by_the_epoch(dated: str) -> None:
+    """About 2.5 cm a year against ITRF, on whichever side the epoch stands."""
+    found = []
+    for epoch in (2015.0, 2025.0):
+        spec, output = replace(ETRS89, epoch=epoch), ITRF2020
+        if dated == "output":
+            spec, output = ETRS89, replace(ITRF2020, epoch=epoch)
+        found.append(moved(spec, output))
+    assert (found[1] - found[0])[:2] / 10.0 == pytest.approx([0.0200, 0.0160], abs=0.006)
+    assert moved(ETRS89, ITRF2020) == pytest.approx(found[0])
+
+
+def test_two_epochs_are_refused() -> None:
+    """Points would have to be moved from one to the other."""
+    with pytest.raises(InputError, match="moves no points from one to another") as caught:
+        tie_frames([replace(ETRS89, epoch=2015.0)], replace(ITRF2020, epoch=2020.0))
+    assert [fault.code for fault in caught.value.faults] == ["epochs"]
+
+
+def notes(crs: str, output: FrameSpec) -> dict[str, str]:
+    """Notes of a run by their codes."""
+    simulation = simulate(Spec(seed=3, flight=Flight(photos=4), ground=Ground(crs, center_deg=(11.5, 48.2))))
+    inputs = replace(inputs_of(simulation), output=output)
+    return {note.code: note.message for note in triangulate(inputs, settings_of(simulation)).notes}
+
+
+@pytest.mark.slow
+def test_a_change_of_datum_is_told_with_its_accuracy_and_area() -> None:
+    """It was not told at all."""
+    told = notes("EPSG:31468", FrameSpec("EPSG:25832", GROUND_AXES))
+    assert "DHDN to ETRS89" in told["datum-change"]
+    assert "accuracy 1 m" in told["datum-change"]
+    assert "made for Germany" in told["datum-change"]
+    assert "epoch-missing" not in told
+
+
+@pytest.mark.slow
+def test_an_epoch_is_asked_for_where_it_matters() -> None:
+    """Ten years are 0.3 m, the control is good to 0.05 m."""
+    told = notes("EPSG:25832", ITRF2020)
+    assert "no `epoch` is given: that of the operation, 2015.0, is taken" in told["epoch-missing"]
+    told = notes("EPSG:25832", replace(ITRF2020, epoch=2025.5))
+    assert "epoch-missing" not in told
+    assert told["datum-change"].endswith("coordinates of 2025.5")
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "frames.md"
+EXAMPLES = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+
+
+def description(entry: dict[str, Any]) -> FrameSpec:
+    """Give the frame that one entry of a project file describes."""
+    rest = {key: value for key, value in entry.items() if key in {"height", "geoid_undulation"}}
+    if "ellipsoid" in entry:
+        rest["ellipsoid"] = (entry["ellipsoid"]["a"], entry["ellipsoid"]["b"])
+    return FrameSpec(entry["crs"], tuple(entry["axes"]), **rest)
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_example(example: str, tmp_path: Path) -> None:
+    write_gtx(tmp_path / "own_geoid.gtx", np.full((11, 11), 45.0), south=40.0, west=10.0, step=1.0)
+    project = yaml.safe_load(example)
+    control = [description(entry) for entry in project["control"]]
+    output = description(project["output"]) if "output" in project else None
+    frames, out = tie_frames(control, output, directory=tmp_path)
+    assert [frame.spec for frame in frames] == control
+    assert out.spec == (output or control[0])
+
+
+def test_the_page_has_examples() -> None:
+    assert len(EXAMPLES) >= 5

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geometry import plane
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
 
 SQUARE = np.array([[106.0, -106.0], [-106.0, -106.0], [-106.0, 106.0], [106.0, 106.0]])
 EIGHT = np.vstack([SQUARE, [[0.0, -113.0], [-113.0, 0.0], [0.0, 113.0], [113.0, 0.0]]])

@@ -9,14 +9,17 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
-from photostrip.pipeline.results import ROLES
+from photostrip.arrays import Floats
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.results import ROLES, Result, StripResult
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.project.loading import Project, load_project
@@ -26,16 +29,6 @@ from photostrip.result.table import plain_of
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline, kept, simulated
 from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import Result, StripResult
-
-    Floats = NDArray[np.float64]
 
 DATA = ROOT / "sample_data"
 APOLLO, SXB, SIMULATED = "apollo15-metric-strip", "sxb-strasbourg", "simulated-20"
@@ -118,8 +111,6 @@ def differences(found: Result, *, check: bool) -> Floats:
     return chosen_rows
 
 
-# ------------------------------------------------------------------------------------------------------ baselines
-
 # Largest change that goes unnoticed: of the last digits that are written, and far below what they are good for.
 TOLERANCES = {"_um": 0.11, "_ppm": 0.11, "_deg": 2e-6, "value": 0.11}
 ROTATION = re.compile(r"[ar][123][123]")
@@ -180,9 +171,6 @@ def test_a_sample_gives_what_it_gave_before(name: str, monkeypatch: pytest.Monke
     before = json.loads(baseline(name).read_text(encoding="utf-8"))
     found = list(changes(before, plain_of(kept(name))))
     assert found == [], "when the change is meant: make golden, and review the diff"
-
-
-# ------------------------------------------------------------------------------------------- Apollo 15, five photos
 
 
 @cache
@@ -286,9 +274,6 @@ def test_the_polynomial_helps_the_lunar_strip() -> None:
     assert (rms(better) > 0.9 * limit).all()
 
 
-# ---------------------------------------------------------------------------------------- Strasbourg, three photos
-
-
 @cache
 def strasbourg(control: tuple[str, ...] = (), adjustment: str = "similarity") -> Result:
     """Adjust the Strasbourg strip on some of its control points, by default on all."""
@@ -369,8 +354,6 @@ def test_the_written_angles_are_those_of_the_published_convention() -> None:
         omega, phi, kappa = columns([row], "omega_deg phi_deg kappa_deg")[0]
         assert written[row["photo"]] == pytest.approx([omega, phi, kappa], abs=0.05)
 
-
-# ------------------------------------------------------------------------------------------ twenty simulated photos
 
 SIGMA_UM = 5.0
 GROUND_SIGMA = 0.05  # m, 5 micrometres at 1:10 000

@@ -12,7 +12,7 @@ import pytest
 
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import adjust_project, load_project
-from tests.geodesy.test_zones import in_both
+from tests.geodesy.test_local_frame import in_both
 from tests.project.samples import FILES, PROJECT, Sample, sample
 
 if TYPE_CHECKING:

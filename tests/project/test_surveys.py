@@ -14,7 +14,7 @@ from photostrip.project.reading import read_keys
 from photostrip.project.terrestrial import CamerasFile, known_presets, load_survey
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
-from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
+from tests.terrestrial.simulated import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build
 
 if TYPE_CHECKING:

@@ -113,8 +113,6 @@ def test_overlaps_are_those_asked_for() -> None:
 
 
 def test_points_that_nobody_can_see_refuse_the_strip() -> None:
-    from photostrip.errors import InputError
-
     with pytest.raises(
         InputError, match=r"no point lies on photos 1\d\d\d, 1\d\d\d and 1\d\d\d; raise end_lap_percent"
     ) as caught:

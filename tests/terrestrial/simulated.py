@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series, monitor
 from photostrip.terrestrial.normal_case import StereoPair
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from photostrip.terrestrial.monitoring import Monitoring
-
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 ARCSECOND = np.pi / 180 / 3600
 FOCAL = (190.0, 100.0)
@@ -118,49 +111,96 @@ def world(number: int = 30, moving: int = 15, stable: int = 6, seed: int = 1, si
     return World(points, velocity, stable)
 
 
-@dataclass
-class Count:
-    """What many simulated surveys say of the last displacements of the points that are not stable."""
-
-    runs: int = 0
-    errors: list[Floats] = field(default_factory=list)  # in standard deviations
-    plan: list[Floats] = field(default_factory=list)  # squared, weighted by the inverse covariance
-    space: list[Floats] = field(default_factory=list)
-    false: list[Flags] = field(default_factory=list)  # points that stand still and are called moved
-    stable_false: list[Flags] = field(default_factory=list)
-    cameras: list[bool] = field(default_factory=list)  # whether the first turned camera was called turned
-    sigma: list[Floats] = field(default_factory=list)
-
-    def add(self, truth: World, result: Monitoring) -> None:
-        step = result.since_first[-1]
-        ordinary = ~result.series.stable
-        error = step.values - truth.velocity * (truth.epochs - 1)
-        self.errors.append((error / step.sigma)[ordinary])
-        self.plan.append(weighted(error[:, :2], step.covariance[:, :2, :2])[ordinary])
-        self.space.append(weighted(error, step.covariance)[ordinary])
-        still = ordinary & ~truth.velocity.any(axis=1)
-        moved = result.significant(step)
-        self.false.append(moved[still])
-        self.stable_false.append(moved[result.series.stable & ~truth.velocity.any(axis=1)])
-        self.cameras.append(result.cameras[-2].moved)
-        self.sigma.append(step.sigma[ordinary])
-        self.runs += 1
-
-
 def weighted(error: Floats, covariance: Floats) -> Floats:
     """Squared length of errors in the metric of their covariance, by the inverse itself."""
     return np.asarray(np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error), float)
 
 
-def repeated(truth: World, runs: int, settings: MonitoringSettings | None = None, first: int = 1) -> Count:
-    """Measure and compute a survey many times."""
-    count = Count()
-    for seed in range(first, first + runs):
-        count.add(truth, monitor(truth.measure(seed), truth.pair, settings or MonitoringSettings()))
-    return count
+def repeated(truth: World, runs: int) -> dict[str, Floats]:
+    """Measure a survey many times: last displacements of the points that are not stable, and what is called moved.
+
+    ``errors`` in standard deviations; ``plan`` and ``space`` squared, weighted by the inverse covariance; ``false`` and
+    ``stable false``: points that stand still and are called moved; ``cameras``: the last left camera is called turned.
+    """
+    found: dict[str, list[Floats]] = {}
+    still = ~truth.velocity.any(axis=1)
+    for seed in range(1, runs + 1):
+        result = monitor(truth.measure(seed), truth.pair, MonitoringSettings())
+        step, ordinary = result.since_first[-1], ~result.series.stable
+        error, moved = step.values - truth.velocity * (truth.epochs - 1), result.significant(step)
+        for name, values in {
+            "errors": (error / step.sigma)[ordinary],
+            "plan": weighted(error[:, :2], step.covariance[:, :2, :2])[ordinary],
+            "space": weighted(error, step.covariance)[ordinary],
+            "false": moved[ordinary & still],
+            "stable false": moved[~ordinary & still],
+            "cameras": np.array([result.cameras[-2].moved]),
+        }.items():
+            found.setdefault(name, []).append(values)
+    return {name: np.concatenate(values) for name, values in found.items()}
 
 
-def turned(truth: World, *arcseconds: float) -> World:
+def with_turn(truth: World, *arcseconds: float) -> World:
     """Turn the left camera in the last epoch."""
     right, up, roll = arcseconds
     return replace(truth, turns={(truth.epochs - 1, 0): (right, up, roll)})
+
+
+PROJECT = """\
+photostrip_terrestrial: 1
+name: quarry
+cameras:
+  long: {principal_distance: 190.0, format: [160, 120]}
+  wide: {preset: UMK 10/1318}
+axes: [east, north, up]
+stations:
+  left: {camera: long, position: [1000.0, 2000.0, 150.0], alpha: LA, omega: LO, kappa: LK}
+  right: {camera: wide, position: [1040.0, 2005.0, 152.0], alpha: RA, omega: RO, kappa: RK}
+epochs: [{id: epoch 0, time: 0}, {id: epoch 1, time: 1}, {id: epoch 2, time: 2}]
+measurements: {coordinates: coordinates.csv, unit: mm, sigma: 0.005}
+stable: [P0, P1, P2, P3, P4, P5]
+"""
+TRUTH = with_turn(replace(world(number=12, moving=4, size=0.05), epochs=3), 60.0, -30.0, 45.0)
+
+
+def project(unit: str = "deg") -> str:
+    """Give the text of the project of ``TRUTH``."""
+    per_radian = 180 / np.pi if unit == "deg" else 200 / np.pi
+    text = PROJECT
+    for letter, angles in zip("LR", TRUTH.attitudes, strict=True):
+        for name, angle in zip("AOK", angles, strict=True):
+            text = text.replace(f" {letter}{name}", f" {angle * per_radian:.12f}")
+    return text
+
+
+def coordinates(truth: World = TRUTH, seed: int = 1, sigma: float = 0.005, decimals: int = 4) -> str:
+    """Give the table of image coordinates of a survey."""
+    series = truth.measure(seed, sigma)
+    lines = ["epoch,photo,point,x,z"]
+    for number, epoch in enumerate(series.epochs):
+        for row, point in enumerate(series.points):
+            xl, zl, xr, zr = series.coordinates[number, row]
+            lines.append(f"{epoch},left,{point},{xl:.{decimals}f},{zl:.{decimals}f}")
+            lines.append(f"{epoch},right,{point},{xr:.{decimals}f},{zr:.{decimals}f}")
+    return "\n".join(lines) + "\n"
+
+
+def pseudo_parallaxes(truth: World = TRUTH, seed: int = 1, sigma: float = 0.005, decimals: int = 9) -> str:
+    """Give the table of pseudo-parallaxes of a survey."""
+    series = truth.measure(seed, sigma)
+    first = series.coordinates[0]
+    lines = ["point,epoch,x,z,p,q,dx,dz,dx_right,dz_right"]
+    for number, epoch in enumerate(series.epochs[1:], 1):
+        for row, point in enumerate(series.points):
+            xl, zl, xr, zr = first[row]
+            values = (xl, zl, xl - xr, zl - zr, *(series.coordinates[number, row] - first[row]))
+            lines.append(f"{point},{epoch}," + ",".join(f"{value:.{decimals}f}" for value in values))
+    return "\n".join(lines) + "\n"
+
+
+def write(folder: Path, text: str | None = None, table: str | None = None, name: str = "coordinates.csv") -> Path:
+    """Write a project with its table."""
+    (folder / name).write_text(coordinates() if table is None else table, encoding="utf-8")
+    path = folder / "survey.yaml"
+    path.write_text(project() if text is None else text, encoding="utf-8")
+    return path

@@ -22,9 +22,18 @@ from photostrip.project import terrestrial as keys
 from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.source_tree import ROOT
-from tests.terrestrial.files import TRUTH, coordinates, project, pseudo_parallaxes, write
-from tests.terrestrial.simulated import CENTERS, FOCAL, attitude, photo
-from tests.terrestrial.test_orientation import CENTRE, PLACES, directions, from_the_theodolite
+from tests.terrestrial.simulated import (
+    CENTERS,
+    FOCAL,
+    TRUTH,
+    attitude,
+    coordinates,
+    photo,
+    project,
+    pseudo_parallaxes,
+    write,
+)
+from tests.terrestrial.test_one_photo import CENTRE, PLACES, directions, from_the_theodolite
 
 if TYPE_CHECKING:
     from collections.abc import Callable
