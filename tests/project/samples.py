@@ -1,16 +1,11 @@
 """A small project that is right, to be changed in one place by each test."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from photostrip.errors import Fault, InputError
 from photostrip.project.loading import Project, load_project
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 PROJECT = """\
 photostrip: 1

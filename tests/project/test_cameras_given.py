@@ -1,23 +1,17 @@
 """Measured camera positions, given orientations and rotations in every form: what is read, and what is refused."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 from pyproj import Proj
 from scipy.spatial.transform import Rotation
 
+from photostrip.arrays import Floats
 from photostrip.geometry.rotation import from_angles
+from photostrip.pipeline.inputs import GivenOrientations
 from tests.project.samples import FILES, PROJECT, Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
-    from photostrip.pipeline.inputs import GivenOrientations
-
 
 GNSS = """\
 photo,x,y,z,use,time,sx,sy,sz

@@ -1,17 +1,12 @@
 """One thing wrong in a project that is right otherwise: the words, the place, and nothing else said."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from photostrip.errors import InputError
 from photostrip.project.loading import load_project
-from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, Sample, sample
 
 Y, P, C, F = "project.yaml", "observations.csv", "control.csv", "fiducials.csv"
 SECOND_LIST = '  - {file: second.csv, crs: "EPSG:32634", axes: [east, north, up], sigma: [1, 1, 1]}\noutput:'
@@ -267,20 +262,18 @@ def check(lines: list[str], place: str, words: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize(("file", "old", "new", "place", "words"), [(*case[:4], case[4:]) for case in ONE_FAULT])
 def test_a_wrong_project_is_explained(
-    tmp_path: Path, file: str, old: str, new: str, place: str, words: tuple[str, ...]
+    project: Sample, file: str, old: str, new: str, place: str, words: tuple[str, ...]
 ) -> None:
-    project = sample(tmp_path)
     project.change(file, old, new)
     check(project.lines(), place, words)
 
 
 @pytest.mark.parametrize(("file", "old", "new", "place", "words"), [(*case[:4], case[4:]) for case in MARKS])
 def test_wrong_fiducial_marks_are_explained(
-    tmp_path: Path, file: str, old: str, new: str, place: str, words: tuple[str, ...]
+    marked: Sample, file: str, old: str, new: str, place: str, words: tuple[str, ...]
 ) -> None:
-    project = sample(tmp_path, MARKED_FILES)
-    project.change(file, old, new)
-    check(project.lines(), place, words)
+    marked.change(file, old, new)
+    check(marked.lines(), place, words)
 
 
 @pytest.mark.parametrize("files", [FILES, MARKED_FILES])
@@ -314,8 +307,7 @@ LAUGHS = b"a0: &a0 [1]\n" + b"".join(
         (LAUGHS, "project.yaml:", "more than 100000 values"),
     ],
 )
-def test_what_is_no_project_is_refused(tmp_path: Path, content: bytes, place: str, words: str) -> None:
-    project = sample(tmp_path)
+def test_what_is_no_project_is_refused(project: Sample, content: bytes, place: str, words: str) -> None:
     project.write("project.yaml", content)
     check(project.lines(), place, (words,))
 
@@ -328,8 +320,7 @@ def test_a_project_that_is_too_big_is_not_read(tmp_path: Path) -> None:
         load_project(path)
 
 
-def test_a_missing_project_names_its_neighbour(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_missing_project_names_its_neighbour(project: Sample) -> None:
     with pytest.raises(InputError, match=r"projct\.yaml: does not exist; did you mean `project\.yaml`\?"):
         load_project(project.folder / "projct.yaml")
     with pytest.raises(InputError, match=r"is a folder; expected a file; did you mean `.*/project\.yaml`\?"):
@@ -339,8 +330,7 @@ def test_a_missing_project_names_its_neighbour(tmp_path: Path) -> None:
 # -------------------------------------------------------------------------------------- several faults at once
 
 
-def test_faults_of_all_files_come_together(tmp_path: Path) -> None:
-    project = sample(tmp_path, MARKED_FILES)
+def test_faults_of_all_files_come_together(marked: Sample) -> None:
     for change in [
         ("project.yaml", "name: sample", "nmae: sample\nnmae: twice"),
         ("project.yaml", "153.217", "153,217"),
@@ -350,8 +340,8 @@ def test_faults_of_all_files_come_together(tmp_path: Path) -> None:
         ("fiducials.csv", "2002,F1", "2002,F7"),
         ("control.csv", "xyz", "yes"),
     ]:
-        project.change(*change)
-    starts = [line.partition(" ")[0] for line in project.lines()]
+        marked.change(*change)
+    starts = [line.partition(" ")[0] for line in marked.lines()]
     assert starts == [
         "project.yaml:2:1:",
         "project.yaml:3:1:",
@@ -364,8 +354,7 @@ def test_faults_of_all_files_come_together(tmp_path: Path) -> None:
     ]
 
 
-def test_the_same_point_in_two_control_lists_is_refused(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_the_same_point_in_two_control_lists_is_refused(project: Sample) -> None:
     project.change("project.yaml", "output:", SECOND_LIST)
     project.write("second.csv", "point,x,y,z\nN1,1,2,3\nG1,4,5,6\n")
     assert project.lines() == [
@@ -375,8 +364,7 @@ def test_the_same_point_in_two_control_lists_is_refused(tmp_path: Path) -> None:
     assert project.lines() == []
 
 
-def test_a_wrong_export_is_told_once_and_counted(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_wrong_export_is_told_once_and_counted(project: Sample) -> None:
     rows = "".join(f"1001,N{i},{i};5,0\n" for i in range(5000))
     project.write("observations.csv", "photo,point,x,y\n" + rows)
     lines = project.lines()
@@ -384,8 +372,7 @@ def test_a_wrong_export_is_told_once_and_counted(tmp_path: Path) -> None:
     assert "observations.csv: and 4800 more faults in this file" in lines
 
 
-def test_no_photo_of_the_strips_is_measured(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_no_photo_of_the_strips_is_measured(project: Sample) -> None:
     table = "photo,point,x,y\nIMG_1.tif,P1,1,2\nIMG_2.tif,P1,1,2\n"
     project.write("observations.csv", table)
     message = "observations.csv has no point on any photo of the strips; its photos are IMG_1.tif, IMG_2.tif"
@@ -393,8 +380,7 @@ def test_no_photo_of_the_strips_is_measured(tmp_path: Path) -> None:
     assert project.lines() == [f"project.yaml:10:3: strips: {message}; {fix}"]
 
 
-def test_a_photo_under_another_name_is_suggested(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_photo_under_another_name_is_suggested(project: Sample) -> None:
     text = (project.folder / "observations.csv").read_text(encoding="utf-8").replace("2002,", "2002.TIF,")
     project.write("observations.csv", text)
     assert project.lines() == [
@@ -402,22 +388,19 @@ def test_a_photo_under_another_name_is_suggested(tmp_path: Path) -> None:
     ]
 
 
-def test_pixels_ask_for_everything_they_need(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_pixels_ask_for_everything_they_need(project: Sample) -> None:
     project.change("project.yaml", "  unit: mm\n  y_axis: up\n", "  unit: px\n")
     project.change("project.yaml", "    format: [230, 230]\n", "")
     keys = [fault.key for fault in project.faults()]
     assert keys == ["cameras.RC30.pixel_size", "cameras.RC30.format", "observations.y_axis"]
 
 
-def test_first_pixel_needs_the_size_of_a_pixel(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_first_pixel_needs_the_size_of_a_pixel(project: Sample) -> None:
     project.change("project.yaml", "  unit: mm\n", "  unit: mm\n  origin: first-pixel\n")
     assert [fault.key for fault in project.faults()] == ["cameras.RC30.pixel_size"]
 
 
-def test_duplicate_keys_do_not_hide_other_faults(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_duplicate_keys_do_not_hide_other_faults(project: Sample) -> None:
     project.change("project.yaml", "name: sample", "name: a\nname: b")
     project.change("project.yaml", "unit: mm", "unit: cm")
     assert [fault.code for fault in project.faults()] == ["duplicate-key", "word"]

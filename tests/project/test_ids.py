@@ -1,7 +1,5 @@
 """Whatever surveyors call photos and points comes out as it went in; whatever is done to a project, faults are told."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re
@@ -16,7 +14,7 @@ from hypothesis import strategies as st
 from photostrip.errors import InputError
 from photostrip.project.loading import Project, load_project
 from tests.fuzzing import TEXTS
-from tests.project.samples import MARKED_FILES, sample
+from tests.project.samples import MARKED_FILES, Sample, sample
 
 ODD = [
     "0123", "NO", "yes", "1:20", "1e3", "0x1F", "0o17", "~", "null", "-1", "+7", "1_000", "1.0", ".5", "=", "-", "--",
@@ -186,7 +184,6 @@ def test_any_tree_at_any_key(changes: list[tuple[str, object]]) -> None:
 
 
 @pytest.mark.parametrize("assignment", ["", "=", ".", "[0]=1", "a=b=c", "cameras.=1", '"="=1', "strips[999999]=1"])
-def test_odd_overrides(tmp_path: Path, assignment: str) -> None:
-    project = sample(tmp_path)
+def test_odd_overrides(project: Sample, assignment: str) -> None:
     with pytest.raises(InputError):
         project.load([assignment])

@@ -1,14 +1,15 @@
 """The schema: every key described, with its unit and the default of the mathematics; pages say what is read."""
 
-from __future__ import annotations
-
 import json
+from collections.abc import Iterator
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.errors import Fault
 from photostrip.formats.faults import Findings
 from photostrip.formats.measured import Manner, read_control, read_measurements
 from photostrip.pipeline.inputs import Settings
@@ -19,13 +20,6 @@ from photostrip.project.sections import Section
 from tests.loops import nonempty
 from tests.pages import blocks
 from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from photostrip.errors import Fault
-
 
 PLACE = Place("a.yaml", 1, 1)
 UNITS = {"principal_distance": "mm", "sigma0_um": "um", "check_rms_z": "m", "parallax_limit": "mm", "earth_radius": "m"}

@@ -1,8 +1,6 @@
 """Projects of model coordinates: what is read, and every way to get it wrong, with message and place."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +11,6 @@ from photostrip.project.check import check_project
 from photostrip.project.loading import load_project
 from tests.loops import nonempty
 from tests.project.samples import Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 PROJECT = """\
 photostrip: 1

@@ -1,22 +1,15 @@
 """Photos that are listed in no order: how a project gives them their cameras, and what is wrong with one."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.result_json import read_result
-from photostrip.project.loading import load_project
+from photostrip.project.loading import Project, load_project
 from tests.project.samples import FILES, OBSERVATIONS, PROJECT, Sample, sample
 from tests.results import spec, write_project
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.project.loading import Project
 
 STRIPS = PROJECT[PROJECT.index("strips:") : PROJECT.index("observations:")]
 SECOND = "  - id: B\n    camera: RC30\n    photos: [2001, 2002]\n"

@@ -1,7 +1,5 @@
 """Presets and overrides: whose value counts, where a fault is told, and what the presets in configs/ do."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import tempfile
@@ -25,8 +23,7 @@ processing:
 """
 
 
-def test_own_values_win_and_mappings_are_merged(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_own_values_win_and_mappings_are_merged(project: Sample) -> None:
     project.write("preset.yaml", PRESET)
     project.change("project.yaml", "name: sample", "extends: preset.yaml")
     settings = project.load().settings
@@ -36,27 +33,24 @@ def test_own_values_win_and_mappings_are_merged(tmp_path: Path) -> None:
     assert project.load().inputs.observations.xy[0].tolist() == [10.5, -20.25]
 
 
-def test_lists_are_replaced(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_lists_are_replaced(project: Sample) -> None:
     project.write("base.yaml", "strips:\n  - {id: Z, camera: Z, photos: [7, 8]}\n")
     project.change("project.yaml", "name: sample", "extends: base.yaml")
     assert [strip.id for strip in project.load().inputs.strips] == ["A", "B"]
 
 
-def test_paths_of_a_preset_are_relative_to_it(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_paths_of_a_preset_are_relative_to_it(project: Sample) -> None:
     old = PROJECT[PROJECT.index("observations:") : PROJECT.index("control:")]
     project.change("project.yaml", old, "")
     project.change("project.yaml", "name: sample", "extends: shared/base.yaml")
     project.write("shared/base.yaml", old)
-    (tmp_path / "observations.csv").rename(tmp_path / "shared" / "observations.csv")
+    (project.folder / "observations.csv").rename(project.folder / "shared" / "observations.csv")
     loaded = project.load()
-    assert tmp_path / "shared" / "observations.csv" in loaded.files
+    assert project.folder / "shared" / "observations.csv" in loaded.files
     assert 'file: "shared/observations.csv"' in loaded.resolved
 
 
-def test_faults_of_a_preset_are_told_there(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_faults_of_a_preset_are_told_there(project: Sample) -> None:
     project.write("shared/base.yaml", "photostrip: 1\nprocessing:\n  refracton: true\n  earth_radius: 0\n")
     project.change("project.yaml", "name: sample", "extends: shared/base.yaml\nnmae: x")
     assert project.lines() == [
@@ -66,30 +60,26 @@ def test_faults_of_a_preset_are_told_there(tmp_path: Path) -> None:
     ]
 
 
-def test_syntax_of_a_preset_is_told_there(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_syntax_of_a_preset_is_told_there(project: Sample) -> None:
     project.write("base.yaml", "photostrip: 1\nname: a: b\n")
     project.change("project.yaml", "name: sample", "extends: base.yaml")
     assert [line.partition(" ")[0] for line in project.lines()] == ["base.yaml:2:8:"]
 
 
-def test_an_empty_preset_is_told_where_it_is_named(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_an_empty_preset_is_told_where_it_is_named(project: Sample) -> None:
     project.write("base.yaml", "")
     project.change("project.yaml", "name: sample", "extends: base.yaml")
     assert project.lines() == ["project.yaml:2:10: extends: base.yaml is empty"]
 
 
-def test_a_circle_of_presets_is_refused_where_it_closes(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_circle_of_presets_is_refused_where_it_closes(project: Sample) -> None:
     project.write("a.yaml", "extends: b.yaml\n")
     project.write("b.yaml", "photostrip: 1\nextends: ./a.yaml\n")
     project.change("project.yaml", "name: sample", "extends: a.yaml")
     assert project.lines() == ["b.yaml:2:10: extends: a.yaml extends itself; remove one `extends`"]
 
 
-def test_a_long_chain_of_presets_is_refused(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_long_chain_of_presets_is_refused(project: Sample) -> None:
     for number in range(20):
         project.write(f"p{number}.yaml", f"extends: p{number + 1}.yaml\n")
     project.change("project.yaml", "name: sample", "extends: p0.yaml")
@@ -117,9 +107,8 @@ def test_the_last_override_counts(tmp_path: Path) -> None:
     assert loaded.settings.adjustment == "polynomial"
 
 
-def test_overrides_reach_lists_and_names_with_signs(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("RC30", "RC.30")
+def test_overrides_reach_lists_and_names_with_signs(project: Sample) -> None:
+    text = (project.folder / "project.yaml").read_text(encoding="utf-8").replace("RC30", "RC.30")
     project.write("project.yaml", text)
     changes = ["strips[0].id=0123", "strips.1.id='~'", 'cameras."RC.30".principal_point[1]=0.5', "control[0].crs=local"]
     inputs = project.load(changes).inputs
@@ -213,8 +202,7 @@ def test_a_standard_deviation_never_takes_its_unit_from_another_file(tmp_path: P
     assert PROJECT.count("unit: mm") == 1
 
 
-def test_a_unit_on_the_command_line_needs_its_standard_deviation_there(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_unit_on_the_command_line_needs_its_standard_deviation_there(project: Sample) -> None:
     assert len(project.lines(["observations.unit=um"])) == 1
     assert project.lines(["observations.unit=um", "observations.sigma=5"]) == []
 

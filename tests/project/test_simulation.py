@@ -1,7 +1,5 @@
 """Specification files: what may stand in them, and where what is wrong with them is said to be."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from pathlib import Path
 

@@ -1,10 +1,8 @@
 """Terrestrial projects: what they mean, and every way in which they can be wrong, with its place."""
 
 # ruff: noqa: E501 (a message stands on one line, as the user reads it)
-from __future__ import annotations
-
 import zipfile
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +11,10 @@ from photostrip.errors import InputError
 from photostrip.project.reading import read_keys
 from photostrip.project.terrestrial import CamerasFile, known_presets, load_survey
 from photostrip.terrestrial.monitoring import monitor
+from photostrip.terrestrial.normal_case import Phototheodolite
 from tests.loops import nonempty
 from tests.terrestrial.simulated import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.terrestrial.normal_case import Phototheodolite
 
 
 def read_presets(file: str) -> dict[str, Phototheodolite]:

@@ -1,7 +1,5 @@
 """YAML as texts with places: nothing is guessed, and every place is right with either parser."""
 
-from __future__ import annotations
-
 import pytest
 import yaml
 
