@@ -204,9 +204,7 @@ def test_pixels_of_two_cameras(project: Sample) -> None:
         "cameras:\n  big: {principal_distance: 100, format: [80, 60], pixel_size: 0.004}\n"
         "  small: {principal_distance: 50, format: [40, 20], pixel_size: 0.008}\n"
     )
-    project.change("project.yaml", cameras, new)
-    project.change("project.yaml", "camera: RC30", "camera: big")
-    project.change("project.yaml", "camera: RC30", "camera: small")
+    project.change("project.yaml", cameras, new, "camera: RC30", "camera: big", "camera: RC30", "camera: small")
     project.change("project.yaml", "unit: mm\n  y_axis: up", "unit: px\n  y_axis: down")
     found = image_points(project.load())
     assert found["1001", "P1"] == pytest.approx((10.5 * 0.004 - 40, 30 + 20.25 * 0.004), abs=NANOMETRE)

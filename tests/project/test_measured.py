@@ -202,8 +202,7 @@ def test_tenths_of_micrometres(plain: Sample) -> None:
     rows = [row.split(",") for row in FILES["observations.csv"].splitlines()[1:]]
     text = "photo,point,x,y\n" + "".join(f"{a},{b},{float(x) * 1e4:.0f},{float(y) * 1e4:.0f}\n" for a, b, x, y in rows)
     plain.write("observations.csv", text)
-    plain.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n")
-    plain.change("project.yaml", "sigma: 0.005", "sigma: 50")
+    plain.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n", "sigma: 0.005", "sigma: 50")
     found = measured(plain.load())
     assert {key: pytest.approx(value) for key, value in usual.items()} == found
 

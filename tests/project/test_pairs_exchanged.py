@@ -48,38 +48,27 @@ def faults(tmp_path: Path, listing: tuple[str, frozenset[str]]) -> list[tuple[st
     return [(each.code, each.message) for each in findings.faults]
 
 
-@pytest.mark.parametrize("number", [0, 2, 4])
-def test_one_exchanged_pair_is_named(tmp_path: Path, number: int) -> None:
-    """It was told as one line for each of its points, none of which named the pair."""
-    ((code, message),) = faults(tmp_path, listed({number}))
-    assert code == "pair-exchanged"
-    assert f"photos 100{number + 1} and 100{number + 2} are exchanged in their pair" in message
-
-
-def test_all_pairs_exchanged_are_told_once(tmp_path: Path) -> None:
-    """The columns of left and right are exchanged."""
-    ((code, message),) = faults(tmp_path, listed(set(range(PAIRS))))
-    assert code == "pair-exchanged"
-    assert "in every pair" in message
+@pytest.mark.parametrize(
+    ("exchanged", "factor", "noise", "code", "words"),
+    [
+        *(({n}, 1.0, SIGMA, "pair-exchanged", f"photos 100{n + 1} and 100{n + 2} are exchanged") for n in (0, 2, 4)),
+        (set(range(PAIRS)), 1.0, SIGMA, "pair-exchanged", "in every pair"),
+        (set(), 1000.0, SIGMA, "measurements-disagree", "the unit or the standard deviation is wrong"),
+        # coordinates of photos laid in anew scatter by a millimetre: they are in no common system
+        (set(), 1.0, 1.0, "measurements-disagree", ""),
+    ],
+)
+def test_what_is_the_matter_is_told_once(
+    tmp_path: Path, exchanged: set[int], factor: float, noise: float, code: str, words: str
+) -> None:
+    ((found, message),) = faults(tmp_path, listed(exchanged, factor=factor, noise=noise))
+    assert found == code
+    assert words in message
+    assert noise == SIGMA or "agree as measurements do" not in message
 
 
 def test_sound_pairs_are_read(tmp_path: Path) -> None:
-    """Nothing is refused."""
     assert faults(tmp_path, listed(set())) == []
-
-
-def test_another_unit_is_told_as_one(tmp_path: Path) -> None:
-    """Every measurement was refused by itself, and the unit never named."""
-    ((code, message),) = faults(tmp_path, listed(set(), factor=1000.0))
-    assert code == "measurements-disagree"
-    assert "the unit or the standard deviation is wrong" in message
-
-
-def test_photos_laid_in_anew_are_told_once(tmp_path: Path) -> None:
-    """Coordinates that scatter by a millimetre are in no common system."""
-    ((code, message),) = faults(tmp_path, listed(set(), noise=1.0))
-    assert code == "measurements-disagree"
-    assert "agree as measurements do" not in message
 
 
 def told(project: Sample) -> tuple[list[str], list[str]]:
