@@ -1,4 +1,4 @@
-"""Frames tied to one Cartesian frame: datums, geoids, and everything that is refused."""
+"""Frames tied to one Cartesian frame: datums, geoids, epochs, the examples of docs/frames.md, what is refused."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""The whole method against known truth: free of errors it comes back exactly, with errors as theory says, and what must
-not influence the result does not.
+"""The whole method against known truth: free of errors it comes back exactly, with errors as theory says.
 
-The photos are made by the collinearity equations in geocentric space (``simulation``, which has its own
-proof against formulas written apart); nothing of the method is used in making them.
+The photos are made by the collinearity equations (``simulation``, which has its own proof); nothing of the method is
+used in making them.
 """
 
 from __future__ import annotations
