@@ -65,7 +65,7 @@ def photos_of(done: Simulation) -> list[set[int]]:
 
 
 @pytest.mark.slow
-@hypothesis_settings(max_examples=60)
+@hypothesis_settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000),
     lap=st.floats(62.0, 85.0),
