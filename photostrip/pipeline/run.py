@@ -22,7 +22,6 @@ from photostrip.notes import Finding, Note
 from photostrip.pipeline import formed_photos, gate
 from photostrip.pipeline.block_adjustment import adjust_block
 from photostrip.pipeline.block_start import FormedStrips, laid_on_ground
-from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.frames import (
     GroundFrames,
     PhotoCoordinates,
@@ -312,14 +311,13 @@ def _adjusted(
         before = None if whole is None else whole.bundle
         return adjust_block(inputs, settings, observations, control, ground, formed, before)
     # 4-5 intermediate frame, absolute orientation, wrong control, polynomials
-    if inputs.models is not None:
-        of_models = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
-        return join_strips(of_models, observations, ground.output)
-    photos = [stage for stage in formed if isinstance(stage, FormedPhotos)]
-    if whole is not None:  # without the wrong images of control that the whole adjustment found
-        photos = [strip.of_photos for strip in whole.strips]
-    screened = [on_control(stage, control, ground.control, settings, searched=whole is not None) for stage in photos]
+    of_models, again = inputs.models is not None, whole is not None
+    if whole is not None and not of_models:  # without the wrong images of control that the whole adjustment found
+        formed = [strip.of_photos for strip in whole.strips]
+    searched = again and not of_models
+    screened = [on_control(stage, control, ground.control, settings, searched=searched) for stage in formed]
     strips = tuple(adjusted(strip, settings) for strip in screened)
+    if of_models:
+        return join_strips(strips, observations, ground.output)
     # 6 back to the map, with standard deviations
-    of_checks = whole is not None
-    return join_photos(strips, screened, observations, inputs.control, ground.output, settings, of_checks=of_checks)
+    return join_photos(strips, screened, observations, inputs.control, ground.output, settings, of_checks=again)

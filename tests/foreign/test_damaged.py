@@ -24,7 +24,7 @@ from tests.foreign.test_control import small as small_events
 from tests.foreign.test_metashape import small as small_cameras
 from tests.loops import nonempty
 
-DAMAGED = int(os.environ.get("PHOTOSTRIP_DAMAGED", "24"))  # files of each kind
+DAMAGED = int(os.environ.get("PHOTOSTRIP_DAMAGED", "40"))  # files of each kind
 WORDS = [b"nan", b"inf", b"-1", b"0", b"1e999", b"1e300", b"-", b"#", b"x", b"\xff", b"\0", b"\n", b" ", b"\t", b"2.5",
          b"99999999999999999999", b"OPENCV", b"FOV", b"\r", b",", b'"', b"\xe2\x80\xa8"]  # fmt: skip
 VALUES = [struct.pack("<d", each) for each in (np.nan, np.inf, -1.0, 0.0, 1e300)]

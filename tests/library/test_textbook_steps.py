@@ -18,12 +18,13 @@ from tests.vectors import cases
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.calls import Capture
     from tests.vectors import Vector
 
 Document = dict[str, Any]
 
 
-def asked(capsys: pytest.CaptureFixture[str], file: Path, step: str, lines: list[str], *keys: str) -> Document:
+def asked(capsys: Capture, file: Path, step: str, lines: list[str], *keys: str) -> Document:
     """Give what a step answers about a table."""
     file.write_text("\n".join(lines), encoding="utf-8")
     settings = [each for key in keys for each in ("--set", key)]
@@ -37,9 +38,7 @@ def values(document: Document) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("vector", cases("base_chain"))
-def test_a_chain_in_the_angles_of_the_textbook(
-    vector: Vector, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_chain_in_the_angles_of_the_textbook(vector: Vector, tmp_path: Path, capsys: Capture) -> None:
     given, expected = vector.input, vector.expected
     first = [given[f"{name}1_deg"] for name in ("alpha", "omega", "kappa")]
     turn = expected["dependent_pair"]["alpha_omega_kappa_right_deg"]
@@ -52,7 +51,7 @@ def test_a_chain_in_the_angles_of_the_textbook(
     assert again == pytest.approx(expected["alpha2_omega2_kappa2_deg"], abs=1e-9)
 
 
-def test_the_similarity_in_xi_eta_theta(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_similarity_in_xi_eta_theta(tmp_path: Path, capsys: Capture) -> None:
     turn = np.radians([1.5, -2.0, 40.0])
     rng = np.random.default_rng(3)
     model = rng.normal(0, 50, (6, 3))
@@ -67,7 +66,7 @@ def test_the_similarity_in_xi_eta_theta(tmp_path: Path, capsys: pytest.CaptureFi
     assert found["scale"] == pytest.approx(9.5, rel=1e-6)
 
 
-def test_rays_meet_in_the_angles_of_the_textbook(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rays_meet_in_the_angles_of_the_textbook(tmp_path: Path, capsys: Capture) -> None:
     left, right, base = [0.5, -1.0, 20.0], [-0.7, 0.4, 22.0], np.array([900.0, 30.0, -5.0])
     rotations = [steps.from_angles(np.radians(each), "alpha-omega-kappa") for each in (left, right)]
     point, images = np.array([400.0, 250.0, -1500.0]), []
@@ -80,7 +79,7 @@ def test_rays_meet_in_the_angles_of_the_textbook(tmp_path: Path, capsys: pytest.
     assert [found["points"][0][axis] for axis in "xyz"] == pytest.approx(point, abs=1e-6)
 
 
-def test_weights_of_pass_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_weights_of_pass_points(tmp_path: Path, capsys: Capture) -> None:
     first = np.array([[1.0, 2.0, 2.0], [2.0, 3.0, 6.0], [4.0, 4.0, 7.0]])  # 3, 7 and 9 from the centre
     second = first / np.array([[1.5], [1.2], [3.0]])
     factor, departures = steps.scale_transfer(first, second, [1.0, 3.0, 0.0])
@@ -99,7 +98,7 @@ def test_weights_of_pass_points(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "scale.csv:3:" in capsys.readouterr().err
 
 
-def test_the_intermediate_frame_lies_in_its_azimuth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_intermediate_frame_lies_in_its_azimuth(tmp_path: Path, capsys: Capture) -> None:
     """Geodesics of PROJ: a point ahead in the azimuth has X, one to the left Y; heights go into Z."""
     geod, lon, lat, azimuth = pyproj.Geod(ellps="WGS84"), 15.3, 49.2, 75.0
     places = [geod.fwd(lon, lat, azimuth + turn, 500.0)[:2] for turn in (0.0, 180.0, -90.0, 90.0)]
@@ -126,7 +125,7 @@ def test_the_earth_falls_away() -> None:
     assert steps.curvature([[0.0, 0.0, 0.0], [200.0, 0.0, 0.0]], radius=100.0) == pytest.approx([50.0, 50.0])
 
 
-def test_scales_of_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scales_of_pairs(tmp_path: Path, capsys: Capture) -> None:
     model = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0], [0.0, 0.0, 12.0]])
     ground = 7.0 * model
     ground[2, 2] += 1.3
@@ -144,7 +143,7 @@ def test_scales_of_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         steps.pair_scales(model[:1], ground[:1])
 
 
-def test_the_closed_form_is_what_a_fit_leaves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_closed_form_is_what_a_fit_leaves(tmp_path: Path, capsys: Capture) -> None:
     """Influence of the elements less a four parameter fit in plan and a plane in height to the control."""
     base, focal = 92.0, 153.0
     control = np.array([[0.0, 92.0], [92.0, 80.0], [10.0, -92.0], [92.0, -92.0], [50.0, 3.0]])
@@ -181,7 +180,7 @@ def test_the_closed_form_is_what_a_fit_leaves(tmp_path: Path, capsys: pytest.Cap
         steps.closed_form(points, [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]], focal, base)
 
 
-def test_twist_and_bending_of_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_twist_and_bending_of_a_model(tmp_path: Path, capsys: Capture) -> None:
     xy = np.array([[x, y] for x in (0.0, 46.0, 92.0) for y in (-92.0, 0.0, 92.0)])
     x, y = xy.T
     surface = 0.05 - 1e-3 * x + 5e-4 * y - 6e-6 * x * y + 4e-6 * x**2

@@ -5,17 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from contextlib import redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 import pytest
 
-from photostrip import simulation
-from photostrip.cli.main import main as photostrip
+from photostrip import run, simulation
 from photostrip.foreign.simulated import project_files
-from photostrip.formats.result_json import read_result
 from photostrip.simulation.simulation import simulate as simulated
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, Sample, sample
 from tests.source_tree import ROOT
@@ -259,7 +255,7 @@ class Outcome:
     check_um: float
 
 
-def outcome(preset: str, seed: int, *options: str) -> Outcome:
+def outcome(preset: str, seed: int) -> Outcome:
     """Simulate a strip, run it with a preset and compare what was rejected with what is wrong."""
     kind = KINDS[preset]
     film = kind.camera == "film"
@@ -280,12 +276,7 @@ def outcome(preset: str, seed: int, *options: str) -> Outcome:
         folder = Path(place)
         for name, text in {**files, "project.yaml": bare(files["project.yaml"], preset)}.items():
             (folder / name).write_text(text, encoding="utf-8")
-        with redirect_stdout(StringIO()):
-            code = photostrip(["run", str(folder / "project.yaml"), "-o", str(folder / "out"), "--quiet", *options])
-        if code:
-            message = f"{preset}, seed {seed}: exit code {code}"
-            raise RuntimeError(message)
-        result = read_result(str(folder / "out/result.json"))
+        result = run(folder / "project.yaml").document
     wrong = set(json.loads(files["truth.json"])["errors"]["point"])
     rejected = {row["point"] for row in result["rejected"] if not row.get("readmitted", False)}
     # a point that is wrong on two photos by the same amount is wrong without a contradiction

@@ -162,8 +162,9 @@ def test_warnings_stand_among_the_notes() -> None:
 def test_every_number_of_a_table_has_its_unit() -> None:
     """A column of numbers has a unit, or counts something, or is a ratio, which its name says."""
     without = {
-        "points", "rej.", "condition", "scale ratio", "σ0", "redund.", "degree", "terms", "F", "p", "coefficient", "σ",
-        "t", "ratio", "z plan", "z height", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked", "list",
+        "points", "rej.", "condition", "scale ratio", "σ0", "redund.", "degree", "terms", "F", "p", "coefficient",
+        "σ", "t", "d/σ", "d/σ plan", "d/σ height", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked",
+        "list",
     }  # fmt: skip
     for found in nonempty(sections_of(saved())):
         for table in tables(found):
@@ -174,7 +175,7 @@ def test_ranks_keep_the_point_and_its_differences() -> None:
     differences = ["d north", "d east", "d up"]
     expected = {
         "Control points": ["point", "use", *differences, "plan", "height"],
-        "Check points": ["point", *differences, "z plan", "p", "z height", "p"],
+        "Check points": ["point", *differences, "d/σ plan", "p", "d/σ height", "p"],
     }
     for title, names in nonempty(expected.items()):
         (table,) = tables(section(case("north first", 2).document, title))

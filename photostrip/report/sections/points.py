@@ -41,8 +41,8 @@ FAILED_SHOWN = 3  # folds of a cross-validation that could not be adjusted
 MOST_MARKS = 100  # marks: a page of a large block can still be mailed
 UNTESTED = dict.fromkeys(("plan", "height", "p_plan", "p_height"))
 MEANING = (
-    "σ: of the adjusted point; z: difference over its standard deviation, with that of the given point (in plan by the "
-    "whole covariance, 95 % lie below 2.45); p: chance of a larger one"
+    "σ: of the adjusted point; d/σ: difference over its standard deviation, with that of the given point (in plan by "
+    "the whole covariance, 95 % lie below 2.45); p: probability of a larger one"
 )
 BASES = {"a-priori": "as stated", "a-posteriori": "found by the adjustment"}
 
@@ -81,8 +81,8 @@ def given_table(document: Document, given: Rows, role: str, most: int | None) ->
     most_of_all |= {"normalised": fixed(over, 2)}
     other = "the adjustment" if "bundle" in document else "a model point"
     below = (
-        f"plan, height: at {scale_word(document)} scale; ratio: to the combined standard deviation of the given point "
-        f"and of {other}"
+        f"plan, height: at {scale_word(document)} scale; d/σ: the largest over the standard deviation of the given "
+        f"point and of {other}"
     )
     keys = "id used dx dy dz plan_um height_um normalised:1 sigma_1:2 sigma_2:2 sigma_3:2 strips:3"
     return keyed(shown, keys, note_of(note, below), foot=(rms, mean, most_of_all), used=used)
@@ -157,7 +157,7 @@ def cross_validation(document: Document, most: int | None = None) -> Iterator[Pa
     block = document["cross_validation"]
     rows = block["points"]
     failed = [fold for fold in block["folds"] if fold["reason"]]
-    chance = "" if block["p"] is None else f" Probability of larger errors by chance: {100 * block['p']:.1f} %."
+    chance = "" if block["p"] is None else f" Probability of larger errors: {100 * block['p']:.1f} %."
     yield Words(
         f"The same adjustment without some of the control, {counted(len(block['folds']) - len(failed), 'time')}: "
         f"adjusted minus given at the points that it did not see.{chance}"
@@ -299,8 +299,8 @@ def _check(check: Document | None) -> Iterator[tuple[str, str]]:
     ]
     yield "check points", f"{'; '.join(parts)} in units of their standard deviations"
     for test in check["tests"]:
-        squares = f"sum of squares {fixed(test['squares'], 1)} of {counted(test['coordinates'], 'coordinate')}"
-        text = f"{squares}, probability of a larger one by chance {100 * test['p']:.1f} %"
+        count = counted(test["coordinates"], "coordinate")
+        text = f"chi-square {fixed(test['squares'], 1)} of {count}, p = {100 * test['p']:.1f} %"
         yield "all together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}", text
 
 

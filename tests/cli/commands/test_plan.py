@@ -245,6 +245,7 @@ MEASURED = "control.points=[{at: [1, 2], misclosure: [0, 0, 1]}]"
         ("model", ["scale=3000", "flying_height=400"], 2, "are both given"),
         ("model", ["control.sigma=[0, 0, 0]"], 2, "all zero"),
         ("model", ["grid.rows=1"], 2, "1 is out of range"),
+        ("screening", ["seed=-1"], 2, "seed: -1 is out of range"),
         ("model", ["element_errors=[1, 2, 3]"], 2, "element_errors: 3 values are given; expected five"),
         ("model", ["element_errors=[1, 2, x, 4, 5]"], 2, "element_errors.dkappa_arcsec: `x` is not a number"),
         ("model", ["closed_form=yes", "points=[{name: A, at: [1, 2], height: 3}]"], 2, "level ground, and A lie"),

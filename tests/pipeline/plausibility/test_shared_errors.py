@@ -163,39 +163,28 @@ def test_what_is_given_in_height_only_may_be_of_another_kind(adjustment: str) ->
     assert {each.code for each in result.findings} == {"P404"}
 
 
-def two_lists(shift: Sequence[float], *errors: GrossError, adjustment: str = "auto") -> Result:
+def two_lists(shift: Sequence[float]) -> Result:
     """Adjust a strip of which every third control point stands in a second list, shifted as a whole."""
-    spec = Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4), gross_errors=errors)
+    spec = Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4))
     simulation = simulate(spec)
     inputs = inputs_of(simulation)
     control = inputs.control
     second = np.arange(len(control)) % 3 == 0
     control = replace(control, frame=second.astype(np.intp), enu=control.enu + np.outer(second, shift))
     frames = (inputs.frames[0], replace(inputs.frames[0]))
-    settings = replace(settings_of(simulation), adjustment=adjustment)
-    return triangulate(replace(inputs, control=control, frames=frames), settings)
-
-
-@pytest.mark.parametrize(("shift", "code"), [((2.0, 1.0, 0.0), "P407"), ((0.0, 0.0, 2.0), "P404")])
-def test_a_list_that_lies_beside_the_others_is_named(shift: tuple[float, float, float], code: str) -> None:
-    """All its points were rejected one by one, and nothing said that they share one error."""
-    result = two_lists(shift)
-    (finding,) = result.findings
-    assert finding.code == code
-    assert finding.key == "control[1]"
-    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
-    assert result.strips[0].wrong_control == ()
+    return triangulate(replace(inputs, control=control, frames=frames), settings_of(simulation))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("shift", "code", "axes"), [((2.0, 1.0, 0.0), "P407", 3), ((0.0, 0.0, 2.0), "P404", 1)])
 def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, float], code: str, axes: int) -> None:
     """Good control of the other list went with it, one point after the other."""
-    result = two_lists(shift, adjustment="bundle")
+    result = two_lists(shift)
     (finding,) = result.findings
     assert (finding.code, finding.key) == (code, "control[1]")
     assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
     assert finding.message.endswith("cannot be told")  # of two lists
+    assert result.strips[0].wrong_control == ()
     assert result.bundle is not None
     screened = result.bundle.screened
     assert screened.rejections == ()
