@@ -1,4 +1,4 @@
-"""Two published stereopairs: signs and order of every angle, relative orientation, the way to the ground."""
+"""Published pairs, a similarity with standard deviations on both sides, limits and examples of tests for outliers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ellipsoid in Cartesian coordinates and the intermediate frame."""
+"""The ellipsoid in Cartesian coordinates, the intermediate frame, curvature, zones joined through common points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Image coordinates without noise against the collinearity equations, with the ground coordinates as they are given."""
+"""Image coordinates without noise against the collinearity equations; all corrections together give them back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Simulated terrestrial surveys: two convergent cameras, points that move, cameras that turn, noise of known size."""
+"""Simulated terrestrial surveys, in memory and as projects on disk: points that move, cameras that turn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Photo coordinates and directions: the published equations, written out, and numbers computed apart."""
+"""One photo: directions of its points, their accuracy, its orientation by directions with every kind of error."""
 
 from __future__ import annotations
 
