@@ -120,7 +120,8 @@ def repeated(truth: World, runs: int) -> dict[str, Floats]:
     """Measure a survey many times: last displacements of the points that are not stable, and what is called moved.
 
     ``errors`` in standard deviations; ``plan`` and ``space`` squared, weighted by the inverse covariance; ``false`` and
-    ``stable false``: points that stand still and are called moved; ``cameras``: the last left camera is called turned.
+    ``stable false``: points that stand still and are called moved; ``cameras``: the last left camera is called turned;
+    ``parallax`` and ``change``: vertical parallaxes and their changes, in standard deviations.
     """
     found: dict[str, list[Floats]] = {}
     still = ~truth.velocity.any(axis=1)
@@ -135,6 +136,8 @@ def repeated(truth: World, runs: int) -> dict[str, Floats]:
             "false": moved[ordinary & still],
             "stable false": moved[~ordinary & still],
             "cameras": np.array([result.cameras[-2].moved]),
+            "parallax": (result.parallax[-1] / result.parallax_sigma[-1])[ordinary],
+            "change": (result.parallax_change[-1] / result.parallax_change_sigma[-1])[ordinary],
         }.items():
             found.setdefault(name, []).append(values)
     return {name: np.concatenate(values) for name, values in found.items()}
