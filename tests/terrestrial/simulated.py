@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats
 from photostrip.simulation.draws import Draws, Purpose
@@ -19,13 +20,8 @@ SIGMA = 0.005  # mm
 
 
 def about(axis: int, angle: float) -> Floats:
-    """Give the matrix of a rotation about one axis, right-hand rule: written apart from the program."""
-    c, s = np.cos(angle), np.sin(angle)
-    first, second = [(1, 2), (2, 0), (0, 1)][axis]
-    matrix = np.eye(3)
-    matrix[first, first] = matrix[second, second] = c
-    matrix[second, first], matrix[first, second] = s, -s
-    return matrix
+    """Give the matrix of a rotation about one axis, right-hand rule, by a library that is not ours."""
+    return np.asarray(Rotation.from_rotvec(angle * np.eye(3)[axis]).as_matrix(), float)
 
 
 def attitude(alpha: float, omega: float, kappa: float) -> Floats:
