@@ -376,6 +376,11 @@ def test_opensfm_projects_the_points_of_a_reconstruction_onto_the_adjusted_image
         mine = {point: place for (photo, point), place in true.items() if photo == name}
         points = np.array([found["points"][each]["coordinates"] for each in mine])
         assert by_opensfm(camera, shot, points) == pytest.approx(np.array(list(mine.values())), abs=0.01)
+    measured = measured_image_points(block.folder.parent)
+    rays = [row.split("\t") for row in (tmp_path / "sfm" / "tracks.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    assert len(rays) == document["counts"]["image_points_used"]
+    places = np.array([row[3:5] for row in rays], float) * 5500 + [2750, 3667 / 2]
+    assert places == pytest.approx(np.array([measured[row[0], row[1]] for row in rays]), abs=0.01)
     xyz = east_first(document, document["points"])
     if document["frame"]["crs"] == "local":
         assert "reference_lla" not in found

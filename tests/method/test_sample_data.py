@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats
 from photostrip.pipeline.inputs import Inputs, Settings
@@ -307,18 +308,9 @@ def published_orientations() -> tuple[Floats, Floats, Floats]:
     Angles are those of the matrix R3(kappa) R2(phi) R1(omega) from ground to image.
     """
     rows = rows_of(SXB, "reference.csv")
-    angles = np.radians(columns(rows, "omega_deg phi_deg kappa_deg"))
-
-    def about(axis: int, angle: float) -> Floats:
-        turn = np.eye(3)
-        first, second = (axis + 1) % 3, (axis + 2) % 3
-        turn[first, first] = turn[second, second] = np.cos(angle)
-        turn[first, second], turn[second, first] = np.sin(angle), -np.sin(angle)
-        return turn
-
-    rotations = np.array([(about(2, ka) @ about(1, ph) @ about(0, om)).T for om, ph, ka in angles])
+    angles = columns(rows, "omega_deg phi_deg kappa_deg")
     sigmas = columns(rows, "sigma_x sigma_y sigma_z sigma_omega_deg sigma_phi_deg sigma_kappa_deg")
-    return columns(rows, "x y z"), rotations, sigmas
+    return columns(rows, "x y z"), Rotation.from_euler("XYZ", angles, degrees=True).as_matrix(), sigmas
 
 
 def test_strasbourg_orientations_agree_with_the_published_bundle() -> None:

@@ -76,6 +76,20 @@ def test_left_is_left_and_heights_are_ellipsoidal(place: tuple[float, float]) ->
     assert (np.array(azimuth) - (-50.0, 130.0) + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.25)
 
 
+@given(*map(st.floats, (-179.0, -89.0, 0.0, -5e5, -2e4), (179.0, 89.0, 360.0, 5e5, 2e4)))
+def test_frames_are_rotations_with_the_normal_up(lon: float, lat: float, heading: float, s: float, t: float) -> None:
+    space = world(Spec(ground=Ground(center_deg=(lon, lat)), flight=Flight(heading_deg=heading)), GRS80)
+    place = np.array([s]), np.array([t])
+    frame = space.frames(*place)[0]
+    assert frame.T @ frame == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(1.0, abs=1e-12)
+    low, high = (space.cartesian(*place, np.array([h]))[0] for h in (0.0, 1000.0))
+    assert (high - low) / 1000.0 == pytest.approx(frame[:, 2], abs=1e-8)
+    ahead = space.cartesian(place[0] + 1.0, place[1], np.zeros(1))[0] - low
+    assert ahead @ frame[:, 0] == pytest.approx(1.0 * np.cos(t / space.radius), rel=ELLIPSOID_SHAPE)
+    assert abs(ahead @ frame[:, 1]) < ELLIPSOID_SHAPE
+
+
 def photos_of(done: Simulation) -> list[set[int]]:
     """Points of each photo."""
     observations = done.observations
