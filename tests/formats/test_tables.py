@@ -1,4 +1,4 @@
-"""Tables by themselves: chunks, places of cells, memory."""
+"""Tables by themselves: chunks, places of cells, memory; what counts as a number."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from photostrip.formats import tables
-from photostrip.formats.faults import MOST_FAULTS_KEPT, Findings, suggestion
+from photostrip.formats.faults import LARGEST_NUMBER, MOST_FAULTS_KEPT, Findings, NotANumber, number, shown, suggestion
 from photostrip.formats.measured import OBSERVATIONS, read_measurements
-from photostrip.formats.tables import read_table
+from photostrip.formats.tables import floats, read_table
 from photostrip.notes import counted, listed
 
 if TYPE_CHECKING:
@@ -82,8 +82,8 @@ def test_a_fault_names_the_character_where_its_cell_begins(
     order = [column for column in columns if column != "y"]
     order.insert(wanted, "y")
     values = dict(zip(["photo", "point"], texts, strict=False)) | {"x": "1", "y": "bad"}
-    for number, column in enumerate(order):
-        stream.write("," if number else "")
+    for place, column in enumerate(order):
+        stream.write("," if place else "")
         stream.write(" " * blanks)
         begins.append(len(stream.getvalue()) + 1)
         csv.writer(stream, lineterminator="").writerow([values[column]])
@@ -227,3 +227,93 @@ def test_rows_of_all_line_ends_with_and_without_quotes_make_one_table(tmp_path: 
     assert read.xy[:4].tolist() == [[1.5, 2.0], [1.0, 2.0], [-0.25, 4.0], [1.0, 2.0]]
     assert read.table.lines.tolist() == [2, 3, 4, 5, 7, 8]
     assert [(fault.line, fault.column) for fault in findings.faults] == [(7, 7)]
+
+
+@given(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER))
+@example(-0.0)
+@example(LARGEST_NUMBER)
+@example(5e-324)
+def test_every_number_python_writes_is_read_back(value: float) -> None:
+    assert number(repr(value)) == value
+    assert number(f" {value!r}\t") == value
+    assert number(f"{value:.6f}") == float(f"{value:.6f}")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1", 1.0), ("+1", 1.0), ("-.5", -0.5), ("5.", 5.0), ("1e3", 1000.0), ("007", 7.0), ("1E-2", 0.01)],
+)
+def test_forms_of_numbers(text: str, value: float) -> None:
+    assert number(text) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "fix"),
+    [
+        ("", "no value is given", ""),
+        ("nan", "not a measured value", ""),
+        ("-Infinity", "not a measured value", ""),
+        ("1e400", "too large", ""),
+        ("-1.1e15", "too large", ""),
+        ("1,5", "decimal comma", "1.5"),
+        (",5", "decimal comma", ".5"),
+        ("1_000", "digits in groups", "without separators"),
+        ("4 649 871.40", "digits in groups", "without separators"),
+        ("4\u00a0649", "digits in groups", "without separators"),
+        ("12'345", "digits in groups", "without separators"),
+        ("1_0.5", "underscore", "10.5"),
+        ("１２", "ASCII", "12"),
+        ("−5", "ASCII", "-5"),
+        ("٣", "ASCII", "3"),
+        ("12°30'15\"", "one number", "decimal degrees"),
+        ("12:30", "one number", "decimal degrees"),
+        ("12 30 15", "one number", "decimal degrees"),
+        ("3.5 mm", "unit", "3.5"),
+        ("3.5m", "unit", "3.5"),
+        ("0x1F", "not a number", ""),
+        ("1e", "unit", "1"),
+        ("1.2.3", "not a number", ""),
+        ("--1", "not a number", ""),
+        ("x" * 99, "xxx…`", ""),
+    ],
+)
+def test_what_is_no_number_is_explained(text: str, message: str, fix: str) -> None:
+    with pytest.raises(NotANumber) as caught:
+        number(text)
+    assert message in caught.value.message
+    assert fix in caught.value.fix
+
+
+column_cells = st.one_of(
+    st.floats().map(repr),
+    st.text(max_size=6),
+    st.text(alphabet="0123456789+-.eE_, naif\u0663１", max_size=6),
+)
+
+
+@pytest.mark.slow
+@given(st.lists(column_cells, min_size=1, max_size=4))
+@example(["1_0"])
+@example(["\u0663"])
+@example(["1", "infinity"])
+def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: list[str]) -> None:
+    def is_number(cell: str) -> bool:
+        try:
+            number(cell)
+        except NotANumber:
+            return False
+        return True
+
+    fast = floats(column)
+    if fast is None:
+        return
+    assert all(map(is_number, column))
+    assert fast.tolist() == [number(cell) for cell in column]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("a\tb", "a\\tb"), ("a\u200bb", "a\u200bb"), ("🛩️", "🛩️"), ("x" * 41, "x" * 40 + "…"), ("\x00", "\\x00")],
+)
+def test_a_text_in_a_message_stays_on_its_line(text: str, expected: str) -> None:
+    assert shown(text) == expected
