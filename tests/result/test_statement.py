@@ -241,13 +241,13 @@ def test_the_factors_are_those_of_normal_errors() -> None:
     assert f"{stats.rayleigh.ppf(0.95) / sqrt(2):.4f}" == f"{statement.RADIAL_95:.4f}"
 
 
-def test_no_circle_is_stated_for_unequal_errors_and_points_given_in_part_count_where_they_are() -> None:
+def test_no_circle_is_stated_for_unequal_errors() -> None:
     found = figures_at([(1.0, 0.59, 0.1), (-1.0, -0.59, 0.1)])["circle"]
     assert found["ratio"] == pytest.approx(0.59)
     assert np.isnan([found["ce90"], found["ce95"], found["radial95"]]).all()
 
 
-def test_at_most_one_difference_in_ten_is_larger() -> None:
+def test_at_most_one_difference_in_ten_is_larger_and_points_given_in_part_count_where_they_are() -> None:
     for count, beyond in ((9, 0), (10, 1), (19, 1), (30, 3)):
         heights = np.arange(1.0, count + 1)
         rows = np.column_stack([np.zeros(count), np.zeros(count), heights])

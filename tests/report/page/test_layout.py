@@ -157,12 +157,8 @@ def shown(stream: io.StringIO, width: int | None = 100, *, colour: bool | None =
     return stream.getvalue()
 
 
-def plain(width: int = 100) -> str:
+def plain(width: int) -> str:
     return to_text(title_of(saved()), sections_of(saved()), width)
-
-
-def test_a_pipe_gets_the_plain_text() -> None:
-    assert shown(io.StringIO()) == plain()
 
 
 @pytest.mark.parametrize("width", [60, 100, 200])
@@ -171,7 +167,7 @@ def test_colours_change_nothing_but_colours(width: int, monkeypatch: pytest.Monk
     monkeypatch.setenv("TERM", "xterm-256color")
     text = shown(Terminal(), width)
     assert "\x1b[1;31m" in text
-    assert ESCAPE.sub("", text) == plain(width)
+    assert ESCAPE.sub("", text) == plain(width) == shown(io.StringIO(), width)
 
 
 def test_when_there_are_colours() -> None:
@@ -222,9 +218,6 @@ def test_a_kind_is_told_by_examples_and_a_count() -> None:
     assert lines[MOST_OF_A_KIND - 1].startswith("warning: P301 point 4 stands")
     assert lines[MOST_OF_A_KIND] == "warning: P301 4422 more like these; --format json names all"
     assert lines[-1].startswith("error: P402 ")
-
-
-def test_notes_are_counted() -> None:
     notes = [finding_of(Note("unused", f"row {number} is not used")) for number in range(9)]
     assert len(lines_of(notes)) == MOST_OF_A_KIND + 1
     assert lines_of(notes)[-1] == "warning: unused 4 more like these; --format json names all"
@@ -276,16 +269,12 @@ def test_a_terminal_sees_it_and_it_goes_away(
     assert shown or not text
 
 
-def test_short_work_shows_nothing() -> None:
+def test_short_work_shows_nothing_and_a_failure_takes_the_line_away() -> None:
     stream = Terminal()
     with progress(stream) as line:
         line.at("short")
         time.sleep(0.05)
     assert stream.getvalue() == ""
-
-
-def test_a_failure_takes_the_line_away() -> None:
-    stream = Terminal()
 
     def work() -> None:
         with progress(stream, patience=0.0) as line:
