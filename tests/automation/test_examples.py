@@ -102,9 +102,12 @@ def test_the_script_goes_on_after_a_failure_and_ends_with_the_worst_code(tmp_pat
     assert run_script(tmp_path, f"{sys.executable} -m photostrip").returncode == 1
 
 
-def test_the_script_refuses_an_empty_folder(tmp_path: Path) -> None:
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_the_script_and_make_refuse_an_empty_folder(tmp_path: Path) -> None:
     done = run_script(tmp_path, "photostrip")
     assert (done.returncode, done.stderr) == (2, "no ./*/project.yaml\n")
+    done = Folder(tmp_path).make()
+    assert (done.returncode, "no ./*/project.yaml" in done.stderr) == (2, True)
 
 
 @pytest.mark.slow
@@ -242,14 +245,7 @@ def test_make_adjusts_what_changed_and_nothing_else(tmp_path: Path, forked: Path
     (tmp_path / "build/a/depends.mk").unlink()
     assert folder.renewed() == {"a"}
     assert folder.renewed() == set()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_make_names_a_table_that_is_gone_and_keeps_the_result(tmp_path: Path, forked: Path) -> None:
-    two_strips(tmp_path)
-    folder = Folder(tmp_path, forked)
-    assert folder.make("-j2").returncode == 0
+    # a table that is gone is named, and the result kept
     before = (tmp_path / "build/a/result.json").read_bytes()
     (tmp_path / "a/control.csv").unlink()
     folder.touch("b/control.csv")
@@ -285,13 +281,6 @@ def test_make_check_compares_and_watches_tolerances(tmp_path: Path, forked: Path
         assert "DIFFERENT: " in failed.stdout
         assert "FAILED: 1 of 1 tolerance not kept." in failed.stdout
     assert folder.renewed() == set()
-
-
-@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_make_in_an_empty_folder_says_so(tmp_path: Path) -> None:
-    done = Folder(tmp_path).make()
-    assert done.returncode == 2
-    assert "no ./*/project.yaml" in done.stderr
 
 
 def test_make_regress_is_the_example_on_the_samples() -> None:

@@ -17,13 +17,11 @@ from photostrip.cli.main import main
 from photostrip.errors import InputError
 from photostrip.formats.result_json import checked, read_baseline, to_json
 from photostrip.pipeline.inputs import Settings
-from photostrip.pipeline.run import triangulate
 from photostrip.result.description import LEFT_OUT, Block, Quantity, described, result_page, result_schema
-from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, natural_rank, order_of, rounded, rounded_as, significant
 from photostrip.result.reading import read
 from photostrip.result.table import Table, plain_of
-from photostrip.simulation import Models, Spec, simulate
+from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
 from tests.results import case, solved, spec
@@ -74,24 +72,24 @@ def faults(document: Document) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", SAMPLES)
-def test_every_key_of_a_sample_is_described(name: str) -> None:
-    assert faults(read_baseline(str(baseline(name)))) == set()
+def result(name: str) -> Document:
+    """Give a sample's baseline, a result in a frame, or one of another kind."""
+    if name in SAMPLES:
+        return read_baseline(str(baseline(name))) | {"version": ""}
+    if name == "models":
+        return solved(inputs_of(simulate(replace(spec(), models=Models())))).document
+    return (
+        solved(case("projected", 2).inputs, Settings(adjustment="bundle")).document
+        if name == "bundle"
+        else case(name, 2).document
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
-def test_every_key_of_a_result_is_described(adjustment: str) -> None:
-    assert faults(solved(case("projected", 2).inputs, Settings(adjustment=adjustment)).document) == set()
-
-
-def test_every_key_of_independent_models_is_described() -> None:
-    assert faults(solved(inputs_of(simulate(replace(spec(), models=Models())))).document) == set()
-
-
-@pytest.mark.parametrize("frame", ["geographic", "geocentric", "local"])
-def test_coordinates_are_described_in_every_frame(frame: str) -> None:
-    assert faults(case(frame).document) == set()
+@pytest.mark.parametrize("name", [*SAMPLES, "projected", "geographic", "geocentric", "local", "bundle", "models"])
+def test_every_key_of_every_result_is_described_and_keeps_the_schema(name: str) -> None:
+    assert faults(result(name)) == set()
+    assert against_schema(plain_of(result(name))) == []
 
 
 def described_keys(block: Block, path: str = "") -> Iterator[tuple[str, Quantity]]:
@@ -172,26 +170,6 @@ def against_schema(document: dict[str, Any]) -> list[str]:
     return [f"{error.json_path}: {error.message}" for error in VALIDATOR.iter_errors(document)]
 
 
-def results() -> Iterator[dict[str, Any]]:
-    for name in ("simulated-20", "apollo15-metric-strip", "sxb-strasbourg"):
-        yield json.loads((ROOT / f"sample_data/{name}/baseline.json").read_text(encoding="utf-8")) | {"version": ""}
-    yield plain_of(case().document)
-    yield plain_of(document_of(triangulate(case("projected", 2).inputs, Settings(adjustment="bundle"))))
-    strips = inputs_of(simulate(Spec(models=Models(), flight=spec().flight)))
-    yield plain_of(document_of(triangulate(strips, Settings())))
-
-
-@pytest.mark.slow
-def test_every_result_keeps_the_schema() -> None:
-    for document in nonempty(list(results())):
-        assert against_schema(document) == []
-
-
-@pytest.mark.slow
-def test_the_schema_is_one() -> None:
-    VALIDATOR.check_schema(SCHEMA)
-
-
 @pytest.mark.parametrize(
     ("keys", "value", "block"),
     [
@@ -225,7 +203,9 @@ def test_every_key_has_a_meaning_and_every_number_a_unit() -> None:
     assert [row for row in nonempty(rows) if row.count(" | ") < 2] == []
 
 
-def test_the_command_prints_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.slow
+def test_the_schema_is_one_and_the_command_prints_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    VALIDATOR.check_schema(SCHEMA)
     assert main(["schema", "--result"]) == 0
     assert json.loads(capsys.readouterr().out) == SCHEMA
     assert main(["schema", "--result", "-o", str(tmp_path / "keys.md")]) == 0
