@@ -1,8 +1,6 @@
 """Cameras of a project: distances between fiducial marks, k0 of a certificate, cameras in pixels."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +8,7 @@ import pytest
 import photostrip
 from photostrip.project.check import check_project
 from photostrip.strip.corrections import ideal_from_image
-from tests.project.samples import MARKED_FILES, Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
+from tests.project.samples import Sample
 
 GIVEN = "    fiducials: {F1: [106, -106], F2: [-106, -106]}\n"
 PLACES = "    fiducial_places: {F1: bottom-right, F2: bottom-left, F3: top-left, F4: top-right}\n"
@@ -22,14 +16,9 @@ SIDES = "[F1, F2, 211.98], [F2, F3, 212.01], [F3, F4, 211.99], [F4, F1, 212.02]"
 DIAGONALS = "[F1, F3, 299.82], [F2, F4, 299.80]"
 
 
-@pytest.fixture
-def marked(tmp_path: Path) -> Sample:
-    return sample(tmp_path, MARKED_FILES)
-
-
 def certified(marked: Sample, places: str, distances: str) -> list[str]:
     marked.change("project.yaml", GIVEN, f"{places}    fiducial_distances: [{distances}]\n")
-    return [str(fault).replace(f"{marked.folder}/", "") for fault in marked.faults()]
+    return marked.lines()
 
 
 def test_the_camera_gets_coordinates_and_their_quality_is_told(marked: Sample) -> None:
@@ -90,8 +79,7 @@ def polynomial(xy: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("direction", ["image_to_ideal", "ideal_to_image"])
-def test_rays_have_the_directions_of_the_certificate(tmp_path: Path, direction: str) -> None:
-    project = sample(tmp_path)
+def test_rays_have_the_directions_of_the_certificate(project: Sample, direction: str) -> None:
     lens = f"{{model: brown, k0: {K0}, k: {list(RADIAL)}, p: {list(DECENTRING)}, direction: {direction}}}"
     project.change("project.yaml", "{model: brown, k: [1e-8, 0, 0], direction: image_to_ideal}", lens)
     loaded = project.load()
@@ -116,8 +104,7 @@ def test_rays_have_the_directions_of_the_certificate(tmp_path: Path, direction: 
         ),
     ],
 )
-def test_what_is_no_k0_is_refused(tmp_path: Path, lens: str, words: str) -> None:
-    project = sample(tmp_path)
+def test_what_is_no_k0_is_refused(project: Sample, lens: str, words: str) -> None:
     project.change("project.yaml", "{model: brown, k: [1e-8, 0, 0], direction: image_to_ideal}", lens)
     (line,) = project.lines()
     assert line.startswith("project.yaml:8:")

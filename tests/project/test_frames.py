@@ -1,23 +1,17 @@
 """Ground frames of a project: zones joined by common points, datums tied once."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from shutil import copytree
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import adjust_project, load_project
 from tests.geodesy.test_local_frame import in_both
 from tests.project.samples import FILES, PROJECT, Sample, sample
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.results import Result
-
 
 LISTS = """\
 control:

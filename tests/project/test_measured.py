@@ -1,8 +1,6 @@
 """Measured tables as people have them: forms of writing, pairs, points measured again, names of columns, units."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,18 +9,12 @@ import yaml
 from photostrip.foreign.simulated import project_files
 from photostrip.formats.files import write_files
 from photostrip.pipeline.run import triangulate
-from photostrip.project.loading import load_project
+from photostrip.points import PhotoPoints
+from photostrip.project.loading import Project, load_project
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec
 from tests.loops import nonempty
 from tests.project.samples import CONTROL, FIDUCIALS, FILES, MARKED_FILES, OBSERVATIONS, Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.points import PhotoPoints
-    from photostrip.project.loading import Project
-
 
 PAIRS = """\
 pair,point,x,y,p,q
@@ -210,8 +202,7 @@ def test_tenths_of_micrometres(plain: Sample) -> None:
     rows = [row.split(",") for row in FILES["observations.csv"].splitlines()[1:]]
     text = "photo,point,x,y\n" + "".join(f"{a},{b},{float(x) * 1e4:.0f},{float(y) * 1e4:.0f}\n" for a, b, x, y in rows)
     plain.write("observations.csv", text)
-    plain.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n")
-    plain.change("project.yaml", "sigma: 0.005", "sigma: 50")
+    plain.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n", "sigma: 0.005", "sigma: 50")
     found = measured(plain.load())
     assert {key: pytest.approx(value) for key, value in usual.items()} == found
 
@@ -283,9 +274,8 @@ orientations:
 """
 
 
-def test_tables_of_cameras_can_be_written_so(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").partition("processing:")[0]
+def test_tables_of_cameras_can_be_written_so(project: Sample) -> None:
+    text = (project.folder / "project.yaml").read_text(encoding="utf-8").partition("processing:")[0]
     project.write("project.yaml", text + GIVEN)
     project.write("gnss.txt", "1001  500012.4  4649871.4  2012.3\n")
     project.write(
@@ -339,9 +329,8 @@ def test_several_files_of_pairs_and_of_marks(tmp_path: Path) -> None:
     ],
 )
 def test_faults_of_several_files_have_their_own_place(
-    tmp_path: Path, rows: str, said: list[str], place: str, words: str
+    project: Sample, rows: str, said: list[str], place: str, words: str
 ) -> None:
-    project = sample(tmp_path)
     project.write("b.csv", "photo,point,x,y\n" + rows)
     (line,) = project.lines(["observations.file=[observations.csv, b.csv]", *said])
     assert line.startswith(place)
@@ -377,9 +366,8 @@ def test_faults_of_several_files_have_their_own_place(
     ],
 )
 def test_what_is_wrong_is_explained(
-    tmp_path: Path, text: str, said: list[str], place: str, words: str, fix: str
+    project: Sample, text: str, said: list[str], place: str, words: str, fix: str
 ) -> None:
-    project = sample(tmp_path)
     project.write("observations.csv", text)
     first, *_ = project.lines([f"observations.{each}" for each in said])
     assert first.startswith(place)
@@ -387,8 +375,7 @@ def test_what_is_wrong_is_explained(
     assert fix in first.partition(words)[2]
 
 
-def test_points_of_pairs_below_points_of_photos_are_refused(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_points_of_pairs_below_points_of_photos_are_refused(project: Sample) -> None:
     project.write("b.csv", "left,right,point,xl,yl,xr,yr\n1001,1002,P7,1,2,3,4\n")
     (line,) = project.lines(["observations.file=[observations.csv, b.csv]"])
     assert line.startswith("b.csv:1: holds points of pairs, but ")

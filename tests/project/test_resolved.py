@@ -1,17 +1,12 @@
 """The resolved project: nothing left unsaid, the same project, the same text everywhere."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
 from tests.project.samples import MARKED_FILES, Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 EXPECTED = """\
 # A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.
@@ -153,8 +148,7 @@ def test_with_fiducial_marks(tmp_path: Path, unit: str) -> None:
     same(first, second)
 
 
-def test_presets_and_overrides_are_in_it(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_presets_and_overrides_are_in_it(project: Sample) -> None:
     project.write("preset.yaml", "processing: {refraction: true}\n")
     project.change("project.yaml", "name: sample", "extends: preset.yaml")
     resolved = project.load(["processing.relative.grubbs_alpha=1e-7"]).resolved
@@ -175,9 +169,10 @@ def test_it_does_not_depend_on_the_place(tmp_path: Path, monkeypatch: pytest.Mon
     assert texts == {EXPECTED}
 
 
-def test_other_programs_read_the_same_from_it(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("RC30", "0123").replace("id: B", "id: NO")
+def test_other_programs_read_the_same_from_it(project: Sample) -> None:
+    text = (
+        (project.folder / "project.yaml").read_text(encoding="utf-8").replace("RC30", "0123").replace("id: B", "id: NO")
+    )
     project.write("project.yaml", text)
     read = yaml.safe_load(project.load().resolved)
     assert list(read["cameras"]) == ["0123"]
@@ -187,12 +182,11 @@ def test_other_programs_read_the_same_from_it(tmp_path: Path) -> None:
     assert read["processing"]["refraction"] is False
 
 
-def test_long_lists_of_photos_are_broken_into_lines(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_long_lists_of_photos_are_broken_into_lines(project: Sample) -> None:
     names = [f"photo-{number:04d}" for number in range(200)]
     rows = "".join(f"{name},P,1,2\n" for name in names)
     project.change("project.yaml", "[1001, 1002]", f"[{', '.join(names)}]")
-    text = (tmp_path / "observations.csv").read_text(encoding="utf-8")
+    text = (project.folder / "observations.csv").read_text(encoding="utf-8")
     project.write("observations.csv", text + rows)
     resolved = project.load().resolved
     assert max(map(len, resolved.splitlines())) <= 110
