@@ -117,7 +117,8 @@ def repeated(truth: World, runs: int) -> dict[str, Floats]:
 
     ``errors`` in standard deviations; ``plan`` and ``space`` squared, weighted by the inverse covariance; ``false`` and
     ``stable false``: points that stand still and are called moved; ``cameras``: the last left camera is called turned;
-    ``parallax`` and ``change``: vertical parallaxes and their changes, in standard deviations.
+    ``squares``: sigma0 of the turns, squared; ``parallax`` and ``change``: vertical parallaxes and their changes, in
+    standard deviations.
     """
     found: dict[str, list[Floats]] = {}
     still = ~truth.velocity.any(axis=1)
@@ -132,6 +133,7 @@ def repeated(truth: World, runs: int) -> dict[str, Floats]:
             "false": moved[ordinary & still],
             "stable false": moved[~ordinary & still],
             "cameras": np.array([result.cameras[-2].moved]),
+            "squares": np.array([each.turn.weighted_sum / each.turn.dof for each in result.cameras if each.turn]),
             "parallax": (result.parallax[-1] / result.parallax_sigma[-1])[ordinary],
             "change": (result.parallax_change[-1] / result.parallax_change_sigma[-1])[ordinary],
         }.items():

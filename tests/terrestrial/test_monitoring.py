@@ -206,6 +206,7 @@ def test_errors_are_as_large_as_stated(kind: str) -> None:
     assert 0.03 < np.mean(count["stable false"]) < 0.07
     for name in () if "not measured" in kind else ("parallax", "change"):
         assert count[name].std() == pytest.approx(1.0, abs=0.06), name
+    assert count["squares"].mean() == pytest.approx(1.0, abs=0.12)
     found = np.mean(count["cameras"])
     if "turned" in kind:
         assert found == 1.0
