@@ -17,7 +17,7 @@ from photostrip.cli.options import Assigned, Printed, Rule, Silent, Written
 from photostrip.cli.output import Messages, check_target, deliver, write_rule
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, PhotostripError
 from photostrip.planning import PlanKind
-from photostrip.strip import StepName
+from photostrip.strip import STEPS, StepName
 from photostrip.terrestrial import TerrestrialKind
 
 Keys = Annotated[
@@ -99,32 +99,20 @@ def step(
     """Take one step of the method alone, from a table of points; image coordinates in mm.
 
     `photostrip schema --step NAME` lists its keys: principal_distance, base, unit, angles and others.
-    Weights may be left out.
+    Angles are degrees; weights may be left out.
 
     \b
     Columns of FILE:
-      interior      mark, x, y, x_photo, y_photo
-      refine        point, x, y
-      relative      point, x_left, y_left, x_right, y_right
-      intersection  the same
-      chain         photo, omega, phi, kappa (degrees)
-      scale         point, x, y, z, x_next, y_next, z_next, weight
-      strip         photo, point, x, y
-      absolute      point, x, y, z, x_ground, y_ground, z_ground, weight
-      polynomial    point, x, y, z, misclosure
-      resection     point, x, y, x_ground, y_ground, z_ground
-      bundle        photo, point, x, y
-      frame         point, longitude, latitude, height
-      curvature     point, x, y, z
-      pair-scales   as absolute
-      closed-form   point, x, y
-      deformation   point, x, y, dz
     """  # noqa: D301 (the sign by which a paragraph keeps its lines)
     with failures_as(form):
         from photostrip.library.step import step as computed
 
         check_target(output)
         deliver(computed(name, str(file), assignments or [], trace=trace), form, output, quiet=quiet)
+
+
+_columns = (f"  {name:<13} {columns.replace(';', ',')}" for name, (_, columns) in STEPS.items())
+step.__doc__ = (step.__doc__ or "") + "\n    ".join(_columns)
 
 
 def sources(

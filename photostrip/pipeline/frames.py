@@ -147,7 +147,7 @@ def datum_notes(inputs: Inputs, ground: GroundFrames) -> Iterator[Note]:
 
 def curvature_notes(inputs: Inputs, settings: Settings, strips: Sequence[StripResult]) -> Iterator[Note]:
     """Say where a setting of Earth curvature changes nothing, and where local coordinates may lack it."""
-    if settings.absolute.earth_curvature == "auto" and inputs.frames and inputs.frames[0].crs == "local":
+    if curvature_left_out(inputs, settings):
         yield from _left_out(inputs, settings, strips)
     if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":
         text = (
@@ -155,6 +155,11 @@ def curvature_notes(inputs: Inputs, settings: Settings, strips: Sequence[StripRe
             "is curved"
         )
         yield Note("curvature-in-frames", text, severity="note")
+
+
+def curvature_left_out(inputs: Inputs, settings: Settings) -> bool:
+    """Whether local coordinates are taken as they are, and nobody says that their plane is a true one."""
+    return settings.absolute.earth_curvature == "auto" and bool(inputs.frames) and inputs.frames[0].crs == "local"
 
 
 def _left_out(inputs: Inputs, settings: Settings, strips: Sequence[StripResult]) -> Iterator[Note]:

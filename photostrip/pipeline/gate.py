@@ -137,7 +137,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     images = replace(images, observations=points)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [replace(each.of_photos, observations=as_given) for each in stages]
-    causes = [] if result.bundle is None else list(shared_errors.of_bundle(result.bundle, inputs))
+    causes = [] if result.bundle is None else list(shared_errors.of_bundle(result.bundle, inputs, result.settings))
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
     odd = {each.strip.id for each in formed if given_on_ground.is_doubtful(each, result, predicted)}
     doubtful = [each for each in formed if misread or each.strip.id in odd]

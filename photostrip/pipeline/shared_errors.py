@@ -41,7 +41,8 @@ from photostrip.notes import Finding, listed
 from photostrip.pipeline.evidence import OnControl
 from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
-from photostrip.pipeline.inputs import Inputs, Strip
+from photostrip.pipeline.frames import curvature_left_out
+from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import CAUSES, Evidence
@@ -51,6 +52,7 @@ from photostrip.strip.fitted_strip import CheckErrors
 
 Common = StretchedHeights | ShiftedList
 FIX = "take it from the certificate"
+CURVED_SIGMAS = 2.0  # standard deviations of k1, within which it is that of the Earth's curvature
 LEAST_WRONG = 0.03  # of a principal distance, from which it is wrong and not only another one
 OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
@@ -163,7 +165,7 @@ KEY = "camera_positions.correction"
 CONTINUED = "The adjustment continued with it; `processing.self_calibration` confirms or refuses it"
 
 
-def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
+def of_bundle(bundle: Bundle, inputs: Inputs, settings: Settings) -> Iterator[Finding]:
     """Name what a group of observations shares (P105, P107, P110, P111, P112, P208, P404, P407)."""
     shared = bundle.screened.common
     yield from (_list(each, inputs) for each in shared if each.kind == LIST)
@@ -171,7 +173,8 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
         cameras = {strip.camera.name for strip in inputs.strips}
         of_cameras = (each for each in bundle.parameters if each.camera in cameras)
         yield from (_distance(each, inputs) for each in of_cameras if _is_distance(each))
-    yield from _lens([each for each in shared if each.kind in OF_LENSES], bundle, inputs)
+    radius = settings.absolute.earth_radius if curvature_left_out(inputs, settings) else None
+    yield from _lens([each for each in shared if each.kind in OF_LENSES], bundle, inputs, radius)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
     of_photos = [each for each in shared if each.kind in OF_PHOTOS]
@@ -241,8 +244,13 @@ def _order(error: Hypothesis, bundle: Bundle) -> Finding:
     return found("P208", message, CAUSES[ORDER].cure, {"order": error.of}, photos=photos, key="camera_positions")
 
 
-def _lens(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
-    """Name the distortion of each camera by everything that was found of it."""
+def _lens(
+    errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs, earth_radius: float | None
+) -> Iterator[Finding]:
+    """Name the distortion of each camera by everything that was found of it, and the curvature that it looks like.
+
+    earth_radius: metres, where the ground frame does not have the curvature.
+    """
     images = bundle.screened.problem.images
     radius, names = float(np.hypot(*images.xy.T).max()), list(CALIBRATION)
     for camera in dict.fromkeys(each.number for each in errors):
@@ -262,10 +270,37 @@ def _lens(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Itera
         )
         fix = f"{CAUSES[LENS].cure}; {_decision(kinds)}"
         numbers: Evidence = {"radius_mm": radius}
+        curved = None if earth_radius is None else _of_curvature(bundle, camera, earth_radius)
+        if curved is not None and _looks_like(parameters, curved):
+            message += (
+                f". The Earth's curvature, which local coordinates taken as they are leave out, would look like k1 = "
+                f"{curved:.3g}"
+            )
+            fix = (
+                "are these map coordinates: name their crs, or set `processing.earth_curvature: model`; is the plane a "
+                f"true one (`earth_curvature: none`): {fix}"
+            )
+            numbers["k1_of_curvature"] = curved
         for each, um in zip(parameters, edge, strict=True):
             numbers |= {each.name: each.value, f"{each.name}_standard_deviation": each.sigma}
             numbers[f"{each.name}_um"] = each.value * um
         yield found("P110", message, fix, numbers, strips=_strips_of(name, inputs), key="processing.self_calibration")
+
+
+def _of_curvature(bundle: Bundle, camera: int, earth_radius: float) -> float:
+    """Return k1, mm^-2, that looks like the Earth's curvature in vertical photos: H / (2 R f^2). Source: [Kraus]."""
+    problem, solution = bundle.screened.problem, bundle.screened.solution
+    rays = problem.cameras.of_photo[problem.images.photo] == camera
+    photo, point = problem.images.photo[rays], problem.images.point[rays]
+    arm = solution.centers[photo] - solution.points[point]
+    height = float(np.nanmedian(np.einsum("ni,ni->n", arm, solution.rotations[photo][:, :, 2])))
+    return max(height, 0.0) / (2.0 * earth_radius * float(problem.cameras.focal[camera]) ** 2)
+
+
+def _looks_like(parameters: Sequence[Parameter], curved: float) -> bool:
+    """Whether the distortion of a lens is that of the Earth's curvature alone, and not zero."""
+    (first, *others) = parameters
+    return not others and first.name == "k1" and abs(first.value - curved) < CURVED_SIGMAS * first.sigma < curved
 
 
 def _point(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:

@@ -12,7 +12,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from photostrip.planning import PlanKind
 from photostrip.project.sections import AUTO, Section, bare, is_section
-from photostrip.strip import StepName
+from photostrip.strip import STEPS
 from photostrip.terrestrial import TerrestrialKind
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ KINDS = {  # where the keys of each kind of file stand, and its title
         f"terrestrial {kind}": ("terrestrial", _class(kind, "File"), f"photostrip terrestrial {kind}")
         for kind in get_args(TerrestrialKind)
     },
-    **{f"step {kind}": ("plans", _class(kind, "Keys"), f"photostrip step {kind}") for kind in get_args(StepName)},
+    **{f"step {kind}": ("plans", _class(kind, "Keys"), f"photostrip step {kind}") for kind in STEPS},
 }
 MEASURED = {  # in a project
     "allOf": [

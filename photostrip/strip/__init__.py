@@ -17,23 +17,28 @@ corrections; the rest is derived, docs/sources.md.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-StepName = Literal[
-    "interior",
-    "refine",
-    "relative",
-    "intersection",
-    "chain",
-    "scale",
-    "strip",
-    "absolute",
-    "polynomial",
-    "resection",
-    "bundle",
-    "frame",
-    "curvature",
-    "pair-scales",
-    "closed-form",
-    "deformation",
-]  # that can be taken alone
+STEPS = {  # that can be taken alone: title, and columns of the table, those of one array together
+    "interior": ("Interior orientation", "mark; x, y; x_photo, y_photo"),
+    "refine": ("Refined image coordinates", "point; x, y"),
+    "relative": ("Relative orientation", "point; x_left, y_left; x_right, y_right"),
+    "intersection": ("Space intersection", "point; x_left, y_left; x_right, y_right"),
+    "chain": ("Orientation handed on along a strip", "photo; omega, phi, kappa"),
+    "scale": ("Scale transfer", "point; x, y, z; x_next, y_next, z_next; weight"),
+    "strip": ("Strip in model coordinates", "photo; point; x, y"),
+    "absolute": ("Absolute orientation", "point; x, y, z; x_ground, y_ground, z_ground; weight"),
+    "polynomial": ("Polynomial", "point; x, y, z; misclosure"),
+    "resection": ("Space resection", "point; x, y; x_ground, y_ground, z_ground"),
+    "bundle": ("Bundle adjustment", "photo; point; x, y"),
+    "frame": ("Intermediate frame", "point; longitude, latitude, height"),
+    "curvature": ("Earth curvature", "point; x, y, z"),
+    "pair-scales": ("Scales of pairs of points", "point; x, y, z; x_ground, y_ground, z_ground"),
+    "closed-form": ("Errors of points in closed form", "point; x, y"),
+    "deformation": ("Deformation of a model", "point; x, y; dz"),
+}
+CONTROL_OF_BUNDLE = "point; x_ground, y_ground, z_ground"  # columns of the second table of ``bundle``
+if TYPE_CHECKING:
+    StepName = str
+else:
+    StepName = Literal[tuple(STEPS)]  # what the command line offers

@@ -1,4 +1,4 @@
-"""Two published stereopairs: signs and order of every angle, relative orientation, the way to the ground."""
+"""Published pairs, a similarity with standard deviations on both sides, limits and examples of tests for outliers."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats
 from photostrip.geometry.rotation import about, angles, from_alpha_omega_kappa
@@ -161,14 +162,9 @@ def points_of(*names: str) -> Floats:
 SOURCE, TARGET = points_of("x", "y", "z"), points_of("X", "Y", "Z")
 
 
-def textbook_angles(rotation: Floats) -> list[float]:
+def textbook_angles(rotation: Floats) -> Floats:
     """Angles w, p, k in degrees of M = R3(k) R2(p) R1(w); the rotation is the transpose of M."""
-    m = rotation.T
-    return [
-        float(np.degrees(np.arctan2(-m[2, 1], m[2, 2]))),
-        float(np.degrees(np.arcsin(m[2, 0]))),
-        float(np.degrees(np.arctan2(-m[1, 0], m[0, 0]))),
-    ]
+    return np.asarray(Rotation.from_matrix(rotation).as_euler("XYZ", degrees=True), float)
 
 
 def test_equal_weights() -> None:

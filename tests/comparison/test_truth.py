@@ -131,11 +131,6 @@ def test_errors_over_their_standard_deviations(frame: str) -> None:
             assert block[name]["known"] == block["count"]
 
 
-def planted(*errors: Document) -> tuple[photostrip.Simulation, photostrip.Result]:
-    simulation = photostrip.simulate({}, flight={"photos": 6}, seed=3, gross_errors=list(errors))
-    return simulation, simulation.project.run()
-
-
 IMAGE = {"kind": "image", "photo": "1003", "point": "1003-4", "axis": "y", "size_um": 300.0}
 CONTROL = {"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}
 SWAP = {"kind": "swap", "photo": "1005", "point": "1005-1"}
@@ -143,7 +138,8 @@ SWAP = {"kind": "swap", "photo": "1005", "point": "1005-1"}
 
 @pytest.mark.slow
 def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
-    simulation, result = planted(IMAGE, CONTROL, SWAP)
+    simulation = photostrip.simulate({}, flight={"photos": 6}, seed=3, gross_errors=[IMAGE, CONTROL, SWAP])
+    result = simulation.project.run()
     whole = photostrip.compare(result, simulation.truth)
     assert whole.document["errors"] == {"planted": 3, "missed": [], "sound_rejected": 0}
     document = copy.deepcopy(result.document)
@@ -159,10 +155,7 @@ def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
         f"not found: swap, photo 1005, points 1005-1 and {simulation.truth['errors']['other'][1]}",
     ):
         assert line in text
-
-
-def test_a_rejection_without_an_error_is_sound() -> None:
-    simulation, result = planted(IMAGE, CONTROL, SWAP)
+    # a rejection without an error is sound
     truth = copy.deepcopy(simulation.truth)
     truth["errors"] = {key: [] for key in truth["errors"]}
     found = photostrip.compare(result, truth)

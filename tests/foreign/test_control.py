@@ -1,4 +1,4 @@
-"""``photostrip convert --control``: control with its image marks in one table, beside a COLMAP model."""
+"""``photostrip convert --control`` and ``--positions``: control with marks in one table, GNSS events beside a block."""
 
 from __future__ import annotations
 

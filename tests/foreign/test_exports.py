@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,16 +100,21 @@ def grid_axes(crs: str, enu: Floats) -> Floats:
     return np.stack([east, north, np.cross(east, north)], axis=1)
 
 
+def distorted(x: Floats, y: Floats, k: Sequence[float], p: Sequence[float]) -> tuple[Floats, Floats]:
+    """Give places with Brown's distortion as OpenCV writes it, of a principal distance of one."""
+    square = x**2 + y**2
+    radial = 1 + square * (k[0] + square * (k[1] + square * k[2]))
+    right = x * radial + 2 * p[0] * x * y + p[1] * (square + 2 * x**2)
+    return right, y * radial + 2 * p[1] * x * y + p[0] * (square + 2 * y**2)
+
+
 def image(ray: Floats) -> Floats:
     """Give pixels of rays in image axes (x right, y up), by the camera of SPEC in millimetres."""
     camera: Document = dict(SPEC["camera"])
     x, y = (-camera["principal_distance"] * ray[:, :2] / ray[:, 2:]).T
-    (k1, _, _), (p1, p2) = camera["distortion"]["k"], camera["distortion"]["p"]
-    square = x**2 + y**2
-    dx = x * k1 * square + p1 * (square + 2 * x**2) + 2 * p2 * x * y
-    dy = y * k1 * square + p2 * (square + 2 * y**2) + 2 * p1 * x * y
+    x, y = distorted(x, y, camera["distortion"]["k"], camera["distortion"]["p"][::-1])  # p1 and p2 as in a project
     (x0, y0), (width, height), size = (camera[each] for each in ("principal_point", "format", "pixel_size"))
-    return np.stack([(x + dx + x0 + width / 2) / size, (height / 2 - y - dy - y0) / size], axis=-1)
+    return np.stack([(x + x0 + width / 2) / size, (height / 2 - y - y0) / size], axis=-1)
 
 
 def adjusted_image_points(document: Document) -> dict[tuple[str, str], Floats]:
@@ -211,11 +217,8 @@ def by_orthority(camera: Document, xyz: Floats, opk: Floats, points: Floats) -> 
     """
     turned = Rotation.from_euler("XYZ", opk).as_matrix() * (1.0, -1.0, -1.0)
     x, y = ((points - xyz) @ turned)[:, :2].T / ((points - xyz) @ turned)[:, 2]
-    k1, k2, p1, p2, k3 = (camera.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3"))
-    square = x**2 + y**2
-    radial = 1 + square * (k1 + square * (k2 + square * k3))
-    xy = np.stack([x * radial + 2 * p1 * x * y + p2 * (square + 2 * x**2),
-                   y * radial + 2 * p2 * x * y + p1 * (square + 2 * y**2)], axis=-1)  # fmt: skip
+    k1, k2, k3, p1, p2 = (camera.get(name, 0.0) for name in ("k1", "k2", "k3", "p1", "p2"))
+    xy = np.stack(distorted(x, y, (k1, k2, k3), (p1, p2)), axis=-1)
     size = np.array(camera["im_size"])
     focal = np.array(camera["focal_len"]) * size / camera["sensor_size"]
     return focal * xy + (size - 1) / 2 + size.max() * np.array([camera["cx"], camera["cy"]])
@@ -352,11 +355,8 @@ def by_opensfm(camera: Document, shot: Document, points: Floats) -> Floats:
     """Project points as OpenSfM documents its brown camera, in pixels from the corner of the first one."""
     x, y, z = (Rotation.from_rotvec(shot["rotation"]).apply(points) + shot["translation"]).T
     x, y = x / z, y / z
-    square = x**2 + y**2
-    radial = 1 + camera["k1"] * square + camera["k2"] * square**2 + camera["k3"] * square**3
-    p1, p2 = camera["p1"], camera["p2"]
-    u = camera["focal_x"] * (radial * x + 2 * p1 * x * y + p2 * (square + 2 * x**2)) + camera["c_x"]
-    v = camera["focal_y"] * (radial * y + 2 * p2 * x * y + p1 * (square + 2 * y**2)) + camera["c_y"]
+    u, v = distorted(x, y, [camera[name] for name in ("k1", "k2", "k3")], [camera[name] for name in ("p1", "p2")])
+    u, v = camera["focal_x"] * u + camera["c_x"], camera["focal_y"] * v + camera["c_y"]
     width, height = camera["width"], camera["height"]
     return np.stack([u, v], axis=-1) * max(width, height) + [width / 2, height / 2]
 
@@ -376,6 +376,11 @@ def test_opensfm_projects_the_points_of_a_reconstruction_onto_the_adjusted_image
         mine = {point: place for (photo, point), place in true.items() if photo == name}
         points = np.array([found["points"][each]["coordinates"] for each in mine])
         assert by_opensfm(camera, shot, points) == pytest.approx(np.array(list(mine.values())), abs=0.01)
+    measured = measured_image_points(block.folder.parent)
+    rays = [row.split("\t") for row in (tmp_path / "sfm" / "tracks.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    assert len(rays) == document["counts"]["image_points_used"]
+    places = np.array([row[3:5] for row in rays], float) * 5500 + [2750, 3667 / 2]
+    assert places == pytest.approx(np.array([measured[row[0], row[1]] for row in rays]), abs=0.01)
     xyz = east_first(document, document["points"])
     if document["frame"]["crs"] == "local":
         assert "reference_lla" not in found
@@ -470,10 +475,7 @@ def projected(camera: Document, opk: Floats, ray: Floats) -> Floats:
     x, y, z = (ray @ Rotation.from_euler("XYZ", opk, degrees=True).as_matrix()).T
     x, y = -x / z, y / z
     k1, k2, k3, p1, p2 = (float(camera[name]) for name in ("k1", "k2", "k3", "p1", "p2"))
-    square = x**2 + y**2
-    radial = 1 + square * (k1 + square * (k2 + square * k3))
-    right = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x**2)
-    down = y * radial + 2 * p2 * x * y + p1 * (square + 2 * y**2)
+    right, down = distorted(x, y, (k1, k2, k3), (p1, p2))
     focal, pixel, x0, y0 = (
         float(camera[each]) for each in ("focal_length", "pixel_pitch", "principal_point_x_mm", "principal_point_y_mm")
     )

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from pyproj import Transformer
 
 import photostrip
 from photostrip.arrays import Floats
@@ -21,6 +20,7 @@ from tests.calls import Capture
 from tests.foreign.colmap_models import F
 from tests.foreign.converting import convert, refused
 from tests.foreign.metashape_models import SCALE, UTM, cameras, document, label_of, markers, simulated
+from tests.foreign.test_exports import geocentric, grid_axes
 from tests.loops import nonempty
 from tests.results import rotation
 
@@ -29,19 +29,8 @@ CONTROL = {"layout": "random", "count": 8, "sigma": [0.01, 0.01, 0.015], "check"
 
 def on_earth(truth: Document) -> tuple[Floats, Floats]:
     """Give grid axes and geocentric places of the photos of a simulation in UTM, by pyproj alone."""
-    to_wgs84 = Transformer.from_crs("EPSG:32633", "EPSG:4979", always_xy=True)
-    to_earth = Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True)
-
-    def geocentric(places: Floats) -> Floats:
-        longitude, latitude = to_wgs84.transform(places[:, 0], places[:, 1])
-        return np.column_stack(to_earth.transform(longitude, latitude, places[:, 2]))
-
     ground = np.array([[photo[axis] for axis in "xyz"] for photo in rows_of(truth["photos"])])
-    axes = []
-    for step in 10.0 * np.eye(3):
-        along = geocentric(ground + step) - geocentric(ground - step)
-        axes.append(along / np.linalg.norm(along, axis=1, keepdims=True))
-    return np.stack(axes, axis=2), geocentric(ground)
+    return grid_axes("EPSG:32633", ground).transpose(0, 2, 1), geocentric("EPSG:32633", ground)
 
 
 @pytest.fixture

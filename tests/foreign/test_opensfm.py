@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import operator
+from collections.abc import Sequence
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from photostrip.project.check import check_project
 from tests.calls import Capture
 from tests.foreign.colmap_models import simulated, small_model
 from tests.foreign.converting import convert, refused, same_points, with_control
-from tests.foreign.opensfm_models import BROWN, ground_control, reconstruction, tracks, write
+from tests.foreign.opensfm_models import ground_control, reconstruction, tracks, write
 
 
 def small() -> tuple[dict[str, Any], str]:
@@ -58,37 +60,37 @@ def test_other_cameras_keep_their_numbers(tmp_path: Path, kind: str) -> None:
     assert ("k2: -0.002" in text) == (kind != "simple_radial")
 
 
-WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+CAMERA, SHOT = ("cameras", "v2 fc"), ("shots", "DJI 0.JPG")
+WRONG: dict[
+    str, tuple[tuple[str, ...], dict[str, Any], str]
+] = {  # where, what is put there (None: taken out), what is told
     "fisheye": (
-        lambda whole: whole["cameras"].update({"v2 fc": {**BROWN, "projection_type": "fisheye"}}),
-        "camera v2 fc: the camera type fisheye has no counterpart; expected one of perspective",
+        CAMERA,
+        {"projection_type": "fisheye"},
+        "camera v2 fc: the camera type fisheye has no counterpart; expect",
     ),
-    "no width": (lambda whole: whole["cameras"]["v2 fc"].pop("width"), "camera v2 fc width: is missing, or no number"),
-    "flat": (
-        lambda whole: whole["cameras"].update({"v2 fc": {**BROWN, "focal_x": 0}}),
-        "camera v2 fc: width, height and focal length are not above 0",
-    ),
-    "camera": (
-        lambda whole: whole["shots"]["DJI 0.JPG"].update(camera="other"),
-        "shot DJI 0.JPG: there is no camera other",
-    ),
-    "rotation": (
-        lambda whole: whole["shots"]["DJI 0.JPG"].update(rotation=[1, 2]),
-        "shot DJI 0.JPG rotation: is missing, or no list of 3 numbers",
-    ),
-    "nan": (
-        lambda whole: whole["shots"]["DJI 0.JPG"].update(translation=[0, float("nan"), 0]),
-        "NaN in it is no number",
-    ),
-    "points": (lambda whole: whole.pop("points"), "points: is missing, or no block of names"),
+    "no width": (CAMERA, {"width": None}, "camera v2 fc width: is missing, or no number"),
+    "flat": (CAMERA, {"focal_x": 0}, "camera v2 fc: width, height and focal length are not above 0"),
+    "camera": (SHOT, {"camera": "other"}, "shot DJI 0.JPG: there is no camera other"),
+    "rotation": (SHOT, {"rotation": [1, 2]}, "shot DJI 0.JPG rotation: is missing, or no list of 3 numbers"),
+    "nan": (SHOT, {"translation": [0, float("nan"), 0]}, "NaN in it is no number"),
+    "points": ((), {"points": None}, "points: is missing, or no block of names"),
 }
+
+
+def changed(record: dict[str, Any], where: Sequence[str | int], values: dict[str, Any]) -> None:
+    """Put values into a part of a document, or take them out."""
+    part = reduce(operator.getitem, where, record)
+    part.update(values)
+    for key in [key for key, value in values.items() if value is None]:
+        del part[key]
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_reconstruction_is_refused_with_its_record(tmp_path: Path, capsys: Capture, name: str) -> None:
     whole, rays = small()
-    change, expected = WRONG[name]
-    change(whole)
+    where, values, expected = WRONG[name]
+    changed(whole, where, values)
     told = refused(capsys, write(tmp_path / "opensfm", [whole], rays), tmp_path / "block")
     assert (
         f"reconstruction.json: {expected}" in told or f"reconstruction.json: reconstruction 1 of 1 {expected}" in told
@@ -102,24 +104,23 @@ def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: 
     assert f"did you mean `{tmp_path / 'site' / 'opensfm'}`?" in told
 
 
-CONTROL: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
-    "twice": (lambda given: given["points"].append(given["points"][0]), "point G is already given"),
+POINT, RAY = ("points", 0), ("points", 0, "observations", 0)
+SAME = {"id": "G", "position": {"latitude": 49.2, "longitude": 15.3, "altitude": 200.0}, "observations": []}
+STRANGERS = [{"shot_id": f"{n}.jpg", "projection": [0.0, 0.0]} for n in range(2)]
+CONTROL: dict[str, tuple[tuple[str | int, ...], dict[str, Any], str]] = {
+    "twice": ((), {"points": [SAME, SAME]}, "point G is already given"),
     "outside": (
-        lambda given: given["points"][0]["observations"][0].update(projection=[0.6, 0]),
-        "point 1 of 1 observation 1 of 2 projection: the mark lies outside the photo",
+        RAY,
+        {"projection": [0.6, 0]},
+        "point 1 of 1 observation 1 of 2 projection: the mark lies outside the p",
     ),
-    "two marks": (
-        lambda given: given["points"][0]["observations"][1].update(shot_id="DJI 0.JPG"),
-        "photo DJI 0.JPG is already given",
-    ),
-    "strangers": (
-        lambda given: [each.update(shot_id=f"{n}.jpg") for n, each in enumerate(given["points"][0]["observations"])],
-        "none of its photos is in the block: 0.jpg, 1.jpg",
-    ),
-    "no place": (lambda given: given["points"][0].pop("position"), "no point has a position"),
-    "no id": (lambda given: given["points"][0].pop("id"), "point 1 of 1 id: is missing, or no text"),
+    "two marks": (RAY, {"shot_id": "DJI 1.JPG"}, "photo DJI 1.JPG is already given"),
+    "strangers": (POINT, {"observations": STRANGERS}, "none of its photos is in the block: 0.jpg, 1.jpg"),
+    "no place": (POINT, {"position": None}, "no point has a position"),
+    "no id": (POINT, {"id": None}, "point 1 of 1 id: is missing, or no text"),
     "no latitude": (
-        lambda given: given["points"][0]["position"].pop("latitude"),
+        (*POINT, "position"),
+        {"latitude": None},
         "point 1 of 1 position latitude: is missing, or no number",
     ),
 }
@@ -130,9 +131,9 @@ def test_wrong_control_is_refused_with_its_record(tmp_path: Path, capsys: Captur
     source = write(tmp_path / "opensfm", [small()[0]], small()[1])
     rays = [{"shot_id": f"DJI {n}.JPG", "projection": [0.01 * n, 0.02]} for n in range(2)]
     place = {"latitude": 49.2, "longitude": 15.3, "altitude": 200.0}
-    given = {"points": [{"id": "G", "position": place, "observations": rays}]}
-    change, expected = CONTROL[name]
-    change(given)
+    given: dict[str, Any] = {"points": [{"id": "G", "position": place, "observations": rays}]}
+    where, values, expected = CONTROL[name]
+    changed(given, where, values)
     control = tmp_path / "gcp.json"
     control.write_text(json.dumps(given), encoding="utf-8")
     told = refused(capsys, source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1")

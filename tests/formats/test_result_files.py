@@ -14,7 +14,7 @@ from photostrip.errors import InputError
 from photostrip.formats.result_json import line_finder, read_result, to_json
 from photostrip.result.table import plain_of, stored
 from tests.loops import nonempty
-from tests.results import FRAMES, by_rows, case, in_tables, result_files, solved
+from tests.results import FRAMES, case, result_files, solved
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,12 +61,6 @@ def test_every_column_stands_on_a_line_of_its_own() -> None:
     assert line_of("no such table", "x") == 0
 
 
-def test_the_tables_are_data_frames() -> None:
-    pandas = pytest.importorskip("pandas")
-    document = json.loads(to_json(case("projected", 2).document))
-    assert pandas.DataFrame(document["points"]).shape == (len(document["points"]["id"]), len(document["points"]))
-
-
 def test_result_json_comes_last() -> None:
     names = list(result_files(case("local").document, "text: 1\n"))
     assert names[-1] == "result.json"
@@ -103,26 +97,9 @@ def test_tables_say_what_result_json_says(frame: str) -> None:
     assert {row["role"] for row in rows(files["given_points.csv"])} == {"control", "check"}
 
 
-def test_longitudes_have_ten_decimals_and_heights_four() -> None:
-    row = rows(result_files(case("geographic").document)["points.csv"])[0]
-    assert [len(row[key].partition(".")[2]) for key in "xyz"] == [10, 10, 4]
-    row = rows(result_files(case("projected").document)["points.csv"])[0]
-    assert [len(row[key].partition(".")[2]) for key in "xyz"] == [4, 4, 4]
-
-
 def test_angles_are_named_by_system_and_unit() -> None:
     head = result_files(case("north first").document)["photos.csv"].splitlines()[0].split(",")
     assert {"alpha_deg", "omega_deg", "kappa_deg", "sigma_kappa_deg"} < set(head)
-
-
-def test_a_measurement_without_a_residual_has_empty_cells() -> None:
-    document = case("local").document
-    changed = by_rows(document)
-    changed["residuals"][0] |= {"vx_um": None, "vy_um": None}
-    before, after = (result_files(each)["residuals.csv"].splitlines() for each in (document, in_tables(changed)))
-    ray = changed["residuals"][0]
-    assert after[1] == f"{ray['photo']},{ray['point']},,,{int(ray['used'])}," + before[1].split(",", 5)[5]
-    assert after[2:] == before[2:]
 
 
 # ------------------------------------------------------------------------------------------------------ reading

@@ -1,4 +1,4 @@
-"""Tables by themselves: chunks, places of cells, memory."""
+"""Tables by themselves: chunks, places of cells, memory; what counts as a number."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from photostrip.formats import tables
-from photostrip.formats.faults import MOST_FAULTS_KEPT, Findings, suggestion
+from photostrip.formats.faults import LARGEST_NUMBER, MOST_FAULTS_KEPT, Findings, NotANumber, number, shown, suggestion
 from photostrip.formats.measured import OBSERVATIONS, read_measurements
-from photostrip.formats.tables import read_table
+from photostrip.formats.tables import floats, read_table
 from photostrip.notes import counted, listed
 
 if TYPE_CHECKING:
@@ -41,7 +41,9 @@ def write(path: Path, text: str | bytes) -> Path:
 
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 1000])
-def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
+def test_chunks_do_not_show_and_columns_that_are_not_there_are_nan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunk: int
+) -> None:
     monkeypatch.setattr(tables, "CHUNK", chunk)
     rows = [(f"p{i % 3}", f"Q{i}", i / 7, -i / 3) for i in range(10)]
     text = HEADER + "\n".join(",".join(map(str, row)) + "\n" * (i % 2) for i, row in enumerate(rows))
@@ -54,9 +56,6 @@ def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chu
     assert read.xy.tolist() == [[row[2], row[3]] for row in rows]
     lines = text.splitlines()
     assert [lines[line - 1].split(",")[1] for line in read.table.lines] == [row[1] for row in rows]
-
-
-def test_columns_that_are_not_there_are_nan(tmp_path: Path) -> None:
     table = read_table(str(write(tmp_path / "o.csv", HEADER + "1,P,2,3\n")), OBSERVATIONS, Findings())
     assert table is not None
     assert np.isnan(table.column("sx")).tolist() == [True]
@@ -82,8 +81,8 @@ def test_a_fault_names_the_character_where_its_cell_begins(
     order = [column for column in columns if column != "y"]
     order.insert(wanted, "y")
     values = dict(zip(["photo", "point"], texts, strict=False)) | {"x": "1", "y": "bad"}
-    for number, column in enumerate(order):
-        stream.write("," if number else "")
+    for place, column in enumerate(order):
+        stream.write("," if place else "")
         stream.write(" " * blanks)
         begins.append(len(stream.getvalue()) + 1)
         csv.writer(stream, lineterminator="").writerow([values[column]])
@@ -95,13 +94,16 @@ def test_a_fault_names_the_character_where_its_cell_begins(
     assert [(fault.line, fault.column) for fault in told] == [(2, begins[wanted])]
 
 
-def test_lines_count_as_editors_do_after_a_quoted_line_break(tmp_path: Path) -> None:
-    text = HEADER + '1,"P\nQ",1,2\n2,P,x,2\n\n3,P,1,y\n'
-    assert [fault.partition(" ")[0] for fault in faults(write(tmp_path / "o.csv", text))] == [
-        "o.csv:2:3:",
-        "o.csv:4:5:",
-        "o.csv:6:7:",
-    ]
+@pytest.mark.parametrize(
+    ("rows", "places"),
+    [
+        ('1,"P\nQ",1,2\n2,P,x,2\n\n3,P,1,y\n', "2:3 4:5 6:7"),
+        ("1,P\n,Q,1,2\n1,R,a,b\n1,S,1,2,3\n1,T,1,2\n1,T,3,4\n", "2 3:1 4:5 4:7 5 7:3"),
+    ],
+)
+def test_every_fault_is_told_and_lines_count_as_editors_do(tmp_path: Path, rows: str, places: str) -> None:
+    told = [fault.partition(" ")[0] for fault in faults(write(tmp_path / "o.csv", HEADER + rows))]
+    assert told == [f"o.csv:{place}:" for place in places.split()]
 
 
 # --------------------------------------------------------------------------------------------- whole tables
@@ -122,6 +124,7 @@ WHOLE = packed(HEADER.encode() * 50)
         ("o.csv", HEADER.encode(), "a header but no rows"),
         ("o.csv", HEADER.encode() + b"\n,,,\n", "a header but no rows"),
         ("o.csv", b'"photo', "never closed"),
+        ("o.csv", b"photo;point;x, mm;y\n1;P;2;3\n", "fields are separated by semicolons"),
         ("o.csv", packed(HEADER.encode()), "is compressed (gzip), but its name does not say so"),
         ("o.csv.gz", HEADER.encode(), "is not compressed"),
         ("o.csv.gz", WHOLE[:-9], "ends too early"),
@@ -173,18 +176,6 @@ def test_a_small_packed_table_does_not_fill_the_memory(tmp_path: Path, part: byt
     assert peak < 3 * len(part) * count
 
 
-def test_what_reads_on_after_a_fault(tmp_path: Path) -> None:
-    text = HEADER + "1,P\n,Q,1,2\n1,R,a,b\n1,S,1,2,3\n1,T,1,2\n1,T,3,4\n"
-    assert [fault.partition(" ")[0] for fault in faults(write(tmp_path / "o.csv", text))] == [
-        "o.csv:2:",
-        "o.csv:3:1:",
-        "o.csv:4:5:",
-        "o.csv:4:7:",
-        "o.csv:5:",
-        "o.csv:7:3:",
-    ]
-
-
 # ------------------------------------------------------------------------------------------------- findings
 
 
@@ -203,15 +194,10 @@ def test_suggestions(name: str, known: list[str], meant: str) -> None:
     assert suggestion(name, known) == (f"did you mean `{meant}`?" if meant else "")
 
 
-def test_ids_in_a_sentence() -> None:
+def test_ids_and_counts_in_a_sentence() -> None:
     assert listed(["a", "b"]) == "a, b"
     assert listed(map(str, range(11))) == "0, 1, 2, 3, 4, 5, 6, 7 and 3 more"
     assert (counted(1, "row"), counted(2, "row"), counted(0, "is", "are")) == ("1 row", "2 rows", "0 are")
-
-
-def test_semicolons_are_named_though_a_head_has_a_comma(tmp_path: Path) -> None:
-    (fault,) = faults(write(tmp_path / "o.csv", "photo;point;x, mm;y\n1;P;2;3\n"))
-    assert "fields are separated by semicolons" in fault
 
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
@@ -227,3 +213,89 @@ def test_rows_of_all_line_ends_with_and_without_quotes_make_one_table(tmp_path: 
     assert read.xy[:4].tolist() == [[1.5, 2.0], [1.0, 2.0], [-0.25, 4.0], [1.0, 2.0]]
     assert read.table.lines.tolist() == [2, 3, 4, 5, 7, 8]
     assert [(fault.line, fault.column) for fault in findings.faults] == [(7, 7)]
+
+
+@given(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER))
+@example(-0.0)
+@example(LARGEST_NUMBER)
+@example(5e-324)
+def test_every_number_python_writes_is_read_back(value: float) -> None:
+    assert number(repr(value)) == value
+    assert number(f" {value!r}\t") == value
+    assert number(f"{value:.6f}") == float(f"{value:.6f}")
+
+
+def test_forms_of_numbers() -> None:
+    assert [*map(number, ("+1", "-.5", "5.", "1e3", "007", "1E-2"))] == [1.0, -0.5, 5.0, 1000.0, 7.0, 0.01]
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "fix"),
+    [
+        ("", "no value is given", ""),
+        ("nan", "not a measured value", ""),
+        ("-Infinity", "not a measured value", ""),
+        ("1e400", "too large", ""),
+        ("-1.1e15", "too large", ""),
+        ("1,5", "decimal comma", "1.5"),
+        (",5", "decimal comma", ".5"),
+        ("1_000", "digits in groups", "without separators"),
+        ("4 649 871.40", "digits in groups", "without separators"),
+        ("4\u00a0649", "digits in groups", "without separators"),
+        ("12'345", "digits in groups", "without separators"),
+        ("1_0.5", "underscore", "10.5"),
+        ("１２", "ASCII", "12"),
+        ("−5", "ASCII", "-5"),
+        ("٣", "ASCII", "3"),
+        ("12°30'15\"", "one number", "decimal degrees"),
+        ("12:30", "one number", "decimal degrees"),
+        ("12 30 15", "one number", "decimal degrees"),
+        ("3.5 mm", "unit", "3.5"),
+        ("3.5m", "unit", "3.5"),
+        ("0x1F", "not a number", ""),
+        ("1e", "unit", "1"),
+        ("1.2.3", "not a number", ""),
+        ("--1", "not a number", ""),
+        ("x" * 99, "xxx…`", ""),
+    ],
+)
+def test_what_is_no_number_is_explained(text: str, message: str, fix: str) -> None:
+    with pytest.raises(NotANumber) as caught:
+        number(text)
+    assert message in caught.value.message
+    assert fix in caught.value.fix
+
+
+column_cells = st.one_of(
+    st.floats().map(repr),
+    st.text(max_size=6),
+    st.text(alphabet="0123456789+-.eE_, naif\u0663１", max_size=6),
+)
+
+
+@pytest.mark.slow
+@given(st.lists(column_cells, min_size=1, max_size=4))
+@example(["1_0"])
+@example(["\u0663"])
+@example(["1", "infinity"])
+def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: list[str]) -> None:
+    def is_number(cell: str) -> bool:
+        try:
+            number(cell)
+        except NotANumber:
+            return False
+        return True
+
+    fast = floats(column)
+    if fast is None:
+        return
+    assert all(map(is_number, column))
+    assert fast.tolist() == [number(cell) for cell in column]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("a\tb", "a\\tb"), ("a\u200bb", "a\u200bb"), ("🛩️", "🛩️"), ("x" * 41, "x" * 40 + "…"), ("\x00", "\\x00")],
+)
+def test_a_text_in_a_message_stays_on_its_line(text: str, expected: str) -> None:
+    assert shown(text) == expected

@@ -1,4 +1,4 @@
-"""Ground frames by themselves: points, directions, differences, local frames, what they refuse."""
+"""Ground frames by themselves: points, directions, differences, refusals; published conversions."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ from photostrip.geodesy.local_frame import (
     mean_position,
 )
 from photostrip.geodesy.tying import tie_frames
-from tests.geodesy.frames import ENU, NEU, columns, frame, krueger, pair, rows, spec, with_height
+from tests.geodesy.frames import ENU, NEU, columns, frame, pair, rows, spec, with_height
 from tests.vectors import Vector, cases
 
 MICROMETRE = 1e-6  # m
 NANORADIAN = 1e-9
-WGS84 = {"a": 6378137.0, "flattening": 1.0 / 298.257223563}
 UTM33 = frame("EPSG:32633")
 
 # crs, west, east, south, north: where each of these is in use
@@ -91,14 +90,6 @@ def test_two_zones_meet_in_one_point(first: str, second: str, lon: float, across
     found = [ZONES[crs].cartesian_from_ground([[*PROJ_ITSELF[crs].transform(*point), up]]) for crs in (first, second)]
     assert np.abs(found[0] - found[1]).max() < MICROMETRE
     assert np.abs(found[0] - cartesian(UTM33, np.array([*point, up]))).max() < MICROMETRE
-
-
-@given(lon=st.floats(11.0, 19.0), lat=st.floats(-80.0, 84.0))
-def test_transverse_mercator_is_that_of_krueger_s_series(lon: float, lat: float) -> None:
-    expected, convergence = krueger(np.array([[lon, lat]]), **WGS84, lon_0=15.0, k0=0.9996)
-    xyz = cartesian(UTM33, np.array([lon, lat, 100.0]))
-    assert UTM33.ground_from_cartesian(xyz)[0, :2] == pytest.approx(expected[0], abs=MICROMETRE)
-    assert UTM33.convergence(xyz) == pytest.approx(convergence, abs=NANORADIAN)
 
 
 @pytest.mark.parametrize("crs", GRIDS)

@@ -1,4 +1,4 @@
-"""The ellipsoid in Cartesian coordinates and the intermediate frame."""
+"""The ellipsoid in Cartesian coordinates, the intermediate frame, curvature, zones joined through common points."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod, Transformer
+from scipy.spatial.transform import Rotation
 
 from photostrip.geodesy import local_frame
 from photostrip.geodesy.crs import join_zones
@@ -22,16 +23,6 @@ latitude = st.floats(-np.pi / 2, np.pi / 2)
 azimuth = st.floats(-2 * np.pi, 2 * np.pi)
 
 
-def rotation(axis: str, angle: float) -> np.ndarray:
-    """Elementary rotation by the right-hand rule."""
-    c, s = np.cos(angle), np.sin(angle)
-    matrix = {
-        "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-        "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-    }[axis]
-    return np.array(matrix)
-
-
 @given(lon=longitude, lat=latitude, height=st.floats(-11000.0, 100000.0))
 def test_geocentric_coordinates_are_those_of_proj(lon: float, lat: float, height: float) -> None:
     cart = Transformer.from_pipeline("+proj=cart +ellps=WGS84")
@@ -44,7 +35,7 @@ def test_axes_matrix_is_a_rotation_with_the_right_axes(lat: float, lon: float, a
     m = axes_matrix(lat, lon, a0)
     assert m.T @ m == pytest.approx(np.eye(3), abs=1e-14)
     assert np.linalg.det(m) == pytest.approx(1.0)
-    product = rotation("z", lon) @ rotation("y", np.pi / 2 - lat) @ rotation("z", np.pi - a0)
+    product = Rotation.from_euler("ZYZ", [lon, np.pi / 2 - lat, np.pi - a0]).as_matrix()
     assert m == pytest.approx(product, abs=1e-14)
     east = np.array([-np.sin(lon), np.cos(lon), 0.0])
     north = np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)])
@@ -80,7 +71,7 @@ def test_points_vectors_and_rotations_go_there_and_back(a0: float) -> None:
     there = frame.intermediate_from_cartesian(points)
     assert frame.cartesian_from_intermediate(there) == pytest.approx(points, abs=1e-9)
     assert there[0] - there[1] == pytest.approx((points[0] - points[1]) @ frame.axes, abs=1e-9)
-    photo = rotation("z", 0.3) @ rotation("y", 0.1)
+    photo = Rotation.from_euler("ZY", [0.3, 0.1]).as_matrix()
     turned = frame.intermediate_rotations(photo[None])
     assert frame.cartesian_rotations(turned)[0] == pytest.approx(photo, abs=1e-14)
     ray = np.array([0.2, -0.1, -1.0])

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats
 from photostrip.pipeline.inputs import Inputs, Settings
@@ -210,12 +211,17 @@ def lunar_errors(found: Result, *, check: bool) -> Floats:
     return errors
 
 
-def test_lunar_pairs_fit_as_others_found() -> None:
+def test_lunar_pairs_fit_and_models_are_joined_as_others_found() -> None:
     found = apollo(screening="none", free=False)
-    assert parallax_rms(found.strips[0]) == pytest.approx([14.8, 8.2, 6.9, 6.8], abs=0.06)
+    strip = found.strips[0]
+    assert parallax_rms(strip) == pytest.approx([14.8, 8.2, 6.9, 6.8], abs=0.06)
     name, size = largest_parallax(found)
     assert name == OUTLIER
     assert size == pytest.approx(128.0, abs=0.5)
+    joints = strip.of_photos.formed.junctions
+    assert np.bincount(joints.junction).tolist() == [31, 43, 64]
+    assert ratio_spread(strip) == pytest.approx([2.1e-3, 8.5e-4, 5.9e-4], rel=0.08)
+    assert [found.refined.observations.point_ids[point] for point in joints.point[~joints.used]] == [OUTLIER]
 
 
 @pytest.mark.slow
@@ -231,28 +237,14 @@ def test_without_the_outlier_the_first_lunar_pair_fits_like_the_others() -> None
     assert parallax_rms(result(APOLLO).strips[0]) == pytest.approx([5.6, 8.2, 6.9, 6.8], abs=0.06)
 
 
-def test_lunar_models_are_joined_by_as_many_points_with_the_same_spread() -> None:
-    strip = apollo(screening="none", free=False).strips[0]
-    assert np.bincount(strip.of_photos.formed.junctions.junction).tolist() == [31, 43, 64]
-    assert ratio_spread(strip) == pytest.approx([2.1e-3, 8.5e-4, 5.9e-4], rel=0.08)
-
-
-def test_the_scale_transfer_finds_the_lunar_outlier_too() -> None:
-    found = apollo(screening="none", free=False)
-    joints = found.strips[0].of_photos.formed.junctions
-    names = [found.refined.observations.point_ids[point] for point in joints.point[~joints.used]]
-    assert names == [OUTLIER]
-
-
-def test_a_similarity_on_all_lunar_points_leaves_what_others_found() -> None:
-    errors = lunar_errors(apollo(screening="none"), check=False)
+@pytest.mark.parametrize(
+    ("adjustment", "degree", "left"),
+    [("similarity", "auto", [19.5, 16.7, 47.8]), ("polynomial", "2", [17.1, 14.1, 38.5])],
+)
+def test_a_fit_to_all_lunar_points_leaves_what_others_found(adjustment: str, degree: str, left: list[float]) -> None:
+    errors = lunar_errors(apollo(adjustment=adjustment, degree=degree, screening="none"), check=False)
     assert len(errors) == 303
-    assert rms(errors) == pytest.approx([19.5, 16.7, 47.8], rel=0.2)
-
-
-def test_a_polynomial_on_all_lunar_points_leaves_what_others_found() -> None:
-    errors = lunar_errors(apollo(adjustment="polynomial", degree="2", screening="none"), check=False)
-    assert rms(errors) == pytest.approx([17.1, 14.1, 38.5], rel=0.2)
+    assert rms(errors) == pytest.approx(left, rel=0.2)
 
 
 @pytest.mark.slow
@@ -286,16 +278,13 @@ def in_order_of_ids() -> list[str]:
     return sorted(project(SXB).inputs.control.ids, key=int)
 
 
-def test_strasbourg_pairs_fit_as_others_found() -> None:
+def test_strasbourg_pairs_fit_and_models_are_joined_as_others_found() -> None:
     found = strasbourg()
-    assert found.strips[0].of_photos.orientation.points_used.tolist() == [233, 206]
-    assert parallax_rms(found.strips[0]) == pytest.approx([5.6, 5.0], abs=0.06)
+    strip = found.strips[0]
+    assert strip.of_photos.orientation.points_used.tolist() == [233, 206]
+    assert parallax_rms(strip) == pytest.approx([5.6, 5.0], abs=0.06)
     assert largest_parallax(found)[1] == pytest.approx(13.8, abs=0.4)
-    assert found.strips[0].of_photos.rejections == ()
-
-
-def test_strasbourg_models_are_joined_by_as_many_points_with_the_same_spread() -> None:
-    strip = strasbourg().strips[0]
+    assert strip.of_photos.rejections == ()
     assert np.bincount(strip.of_photos.formed.junctions.junction).tolist() == [95]
     assert ratio_spread(strip) == pytest.approx([8.7e-4], rel=0.03)
 
@@ -319,18 +308,9 @@ def published_orientations() -> tuple[Floats, Floats, Floats]:
     Angles are those of the matrix R3(kappa) R2(phi) R1(omega) from ground to image.
     """
     rows = rows_of(SXB, "reference.csv")
-    angles = np.radians(columns(rows, "omega_deg phi_deg kappa_deg"))
-
-    def about(axis: int, angle: float) -> Floats:
-        turn = np.eye(3)
-        first, second = (axis + 1) % 3, (axis + 2) % 3
-        turn[first, first] = turn[second, second] = np.cos(angle)
-        turn[first, second], turn[second, first] = np.sin(angle), -np.sin(angle)
-        return turn
-
-    rotations = np.array([(about(2, ka) @ about(1, ph) @ about(0, om)).T for om, ph, ka in angles])
+    angles = columns(rows, "omega_deg phi_deg kappa_deg")
     sigmas = columns(rows, "sigma_x sigma_y sigma_z sigma_omega_deg sigma_phi_deg sigma_kappa_deg")
-    return columns(rows, "x y z"), rotations, sigmas
+    return columns(rows, "x y z"), Rotation.from_euler("XYZ", angles, degrees=True).as_matrix(), sigmas
 
 
 def test_strasbourg_orientations_agree_with_the_published_bundle() -> None:
@@ -395,17 +375,14 @@ def test_simulated_new_points_are_near_the_truth_and_not_on_it() -> None:
     assert (rms(errors) > 0.5 * GROUND_SIGMA).all()
 
 
-def test_the_simulated_noise_is_found_again() -> None:
-    orientation = result(SIMULATED).strips[0].of_photos.orientation
-    squares = float((orientation.pairs.weight * orientation.parallax**2).sum()) / 2
-    redundancy = int(orientation.used.sum()) - 5 * orientation.pairs.size
-    sigma0 = np.sqrt(squares / redundancy) / MICROMETRE
-    assert sigma0 == pytest.approx(SIGMA_UM, rel=3 / np.sqrt(2 * redundancy))
-
-
-def test_the_simulated_gross_errors_are_found_and_nothing_else() -> None:
+def test_the_simulated_gross_errors_are_found_and_nothing_else_and_the_noise_as_well() -> None:
     put_in = {(row["photo"], row["point"]) for row in tables.rows_of(truth()["errors"])}
     assert len(put_in) == 2
     rejected = document_of(result(SIMULATED))["rejected"]
     assert {row["point"] for row in rejected} == {point for _, point in put_in}
     assert put_in <= {(photo, row["point"]) for row in rejected for photo in (row["photo"], row["other_photo"])}
+    orientation = result(SIMULATED).strips[0].of_photos.orientation
+    squares = float((orientation.pairs.weight * orientation.parallax**2).sum()) / 2
+    redundancy = int(orientation.used.sum()) - 5 * orientation.pairs.size
+    sigma0 = np.sqrt(squares / redundancy) / MICROMETRE
+    assert sigma0 == pytest.approx(SIGMA_UM, rel=3 / np.sqrt(2 * redundancy))

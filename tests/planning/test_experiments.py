@@ -1,4 +1,4 @@
-"""The efficiency coefficient of cameras: the table of the source, and what is misprinted in it."""
+"""Cameras compared by the table of the source and its misprints; the experiment with gross errors in pairs."""
 
 from __future__ import annotations
 
@@ -39,12 +39,6 @@ def test_numbers_computed_apart(vector: Vector) -> None:
     assert [each.area for each in beside] == pytest.approx(want["eta_S_true_area_ratio"], rel=1e-12)
     assert [each.height_error for each in beside] == pytest.approx(want["eta_mh"], rel=1e-12)
     assert [camera.height_ratio for camera in cameras] == pytest.approx(want["H_over_mh"], rel=1e-12)
-
-
-def flown(camera: ComparedCamera, m_h: float) -> float:
-    """Ground area of a model, flown as high as a standard deviation of heights allows: m_h = H m_p / b."""
-    scale = m_h * camera.base / camera.sigma / camera.focal
-    return camera.base * scale * camera.width * scale
 
 
 def test_the_printed_table_and_its_misprints() -> None:

@@ -1,4 +1,4 @@
-"""Error theory of a model: the published numbers, the exact intersection, a direct adjustment, a simulated chain."""
+"""Error theory of a model: numbers computed apart, the exact intersection, a direct adjustment, eq. 9-11 as printed."""
 
 from __future__ import annotations
 

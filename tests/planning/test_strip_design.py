@@ -1,4 +1,4 @@
-"""One geometry, measured many times with errors: the scatter of adjusted points beside what a plan expects."""
+"""Planned strips: their geometry, expected precision against simulation, reliability, bands needed, best places."""
 
 from __future__ import annotations
 

@@ -1,16 +1,11 @@
 """A small project that is right, to be changed in one place by each test."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from photostrip.errors import Fault, InputError
 from photostrip.project.loading import Project, load_project
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 PROJECT = """\
 photostrip: 1
@@ -97,10 +92,13 @@ class Sample:
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return path
 
-    def change(self, name: str, old: str, new: str) -> None:
-        text = (self.folder / name).read_text(encoding="utf-8")
-        assert text.count(old) >= 1, f"{old!r} is not in {name}"
-        self.write(name, text.replace(old, new, 1))
+    def change(self, name: str, *texts: str) -> None:
+        """Replace texts, each by the one after it, where they first stand."""
+        content = (self.folder / name).read_text(encoding="utf-8")
+        for old, new in zip(texts[::2], texts[1::2], strict=True):
+            assert old in content, f"{old!r} is not in {name}"
+            content = content.replace(old, new, 1)
+        self.write(name, content)
 
     def load(self, overrides: Sequence[str] = ()) -> Project:
         return load_project(self.folder / "project.yaml", overrides)
@@ -115,6 +113,21 @@ class Sample:
     def lines(self, overrides: Sequence[str] = ()) -> list[str]:
         """Faults as the user reads them, without the folder."""
         return [str(fault).replace(f"{self.folder}/", "") for fault in self.faults(overrides)]
+
+    def reads_as_the_same(self) -> str:
+        """See that the resolved project reads as the project does, and give it."""
+        first = self.load()
+        self.write("project.yaml", first.resolved)
+        again = self.load()
+        assert (again.resolved, again.settings) == (first.resolved, first.settings)
+        return first.resolved
+
+    def tells(self, place: str, *words: str, overrides: Sequence[str] = (), alone: bool = False) -> None:
+        """See that one fault begins with its place and has the words, and perhaps that it is the only one."""
+        lines = self.lines(overrides)
+        told = [line for line in lines if line.startswith(place) and all(word in line for word in words)]
+        assert len(told) == 1, "\n".join(lines) or "no fault"
+        assert lines == told or not alone
 
 
 def sample(folder: Path, files: dict[str, str] | None = None) -> Sample:

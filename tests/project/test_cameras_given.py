@@ -1,23 +1,17 @@
 """Measured camera positions, given orientations and rotations in every form: what is read, and what is refused."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 from pyproj import Proj
 from scipy.spatial.transform import Rotation
 
+from photostrip.arrays import Floats
 from photostrip.geometry.rotation import from_angles
+from photostrip.pipeline.inputs import GivenOrientations
 from tests.project.samples import FILES, PROJECT, Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
-    from photostrip.pipeline.inputs import GivenOrientations
-
 
 GNSS = """\
 photo,x,y,z,use,time,sx,sy,sz
@@ -81,11 +75,7 @@ def test_orientations_come_in_radians(tmp_path: Path) -> None:
 
 
 def test_the_resolved_project_reads_as_the_same(tmp_path: Path) -> None:
-    first = given(tmp_path).load()
-    (tmp_path / Y).write_text(first.resolved, encoding="utf-8")
-    again = Sample(tmp_path).load()
-    assert again.resolved == first.resolved
-    assert again.settings == first.settings
+    assert "lever_arm" in given(tmp_path).reads_as_the_same()
 
 
 def test_approximate_orientations_need_no_standard_deviations(tmp_path: Path) -> None:
@@ -156,22 +146,19 @@ WRONG = [
 def test_what_is_wrong_is_explained(tmp_path: Path, file: str, old: str, new: str, place: str, words: str) -> None:
     project = given(tmp_path)
     project.change(file, old, new)
-    told = [line for line in project.lines() if line.startswith(place) and words in line]
-    assert len(told) == 1, "\n".join(project.lines()) or "no fault"
+    project.tells(place, words)
 
 
 def test_a_table_without_any_photo_of_the_strips(tmp_path: Path) -> None:
     project = given(tmp_path)
     project.write(G, "photo,x,y,z\nDSC_1001,1,2,3\nDSC_1002,1,2,3\n")
-    (told,) = project.lines()
-    assert "has none of the photos of the strips; its photos are DSC_1001, DSC_1002" in told
+    project.tells("", "has none of the photos of the strips; its photos are DSC_1001, DSC_1002", alone=True)
 
 
 def test_single_photos_are_for_bundles_only(tmp_path: Path) -> None:
     project = given(tmp_path)
-    project.change(Y, "adjustment: bundle", "adjustment: polynomial")
-    project.change(Y, "[2001, 2002]", "[2001]")
-    assert any("only one photo" in line and "adjustment: bundle" in line for line in project.lines())
+    project.change(Y, "adjustment: bundle", "adjustment: polynomial", "[2001, 2002]", "[2001]")
+    project.tells("", "only one photo", "adjustment: bundle")
 
 
 PHOTOS = ("1001", "1002", "2001", "2002")
@@ -181,22 +168,24 @@ NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # east, no
 DOWN = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # ahead, right, down of image axes
 AHEAD = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # right is right, up is up, against the view
 
-
 START = "  role: approximate\n"
 
 
-def oriented(
-    folder: Path, columns: str, values: Floats, angles: str, more: str = "  role: approximate\n"
-) -> GivenOrientations:
-    frame = 'crs: "EPSG:32633"\n  axes: [east, north, up]'
+def of_table(folder: Path, table: str, angles: str, more: str = START, crs: str = "EPSG:32633") -> Sample:
+    """Write a project with a table of orientations."""
+    frame = f'crs: "{crs}"\n  axes: [east, north, up]'
     text = f"orientations:\n  file: imu.csv\n  {frame}\n  angles: {{{angles}}}\n{more}"
+    project = PROJECT.replace("processing:\n", BUNDLE).replace("output:\n", f"{text}output:\n")
+    return sample(folder, {**FILES, Y: project, I: table})
+
+
+def oriented(folder: Path, columns: str, values: Floats, angles: str, more: str = START) -> GivenOrientations:
     rows = (
         f"{photo},{','.join(repr(float(each)) for each in (*place, *row))}\n"
         for photo, place, row in zip(PHOTOS, PLACES, values, strict=True)
     )
-    project = PROJECT.replace("processing:\n", BUNDLE).replace("output:\n", f"{text}output:\n")
-    files = {**FILES, "project.yaml": project, "imu.csv": f"photo,x,y,z,{columns}\n" + "".join(rows)}
-    found = sample(folder, files).load().inputs.orientations
+    table = f"photo,x,y,z,{columns}\n" + "".join(rows)
+    found = of_table(folder, table, angles, more).load().inputs.orientations
     assert found is not None
     return found
 
@@ -210,6 +199,11 @@ def of_vehicle(camera: Floats) -> Floats:
     return Rotation.from_matrix(NED.T @ TRUE.as_matrix() @ camera.T).as_euler("ZYX", degrees=True)
 
 
+ELEMENTS = ",".join(f"r{i}{j}" for i in "123" for j in "123")
+MATRIX = "system: matrix, rotates: image_to_ground, y_axis: up"
+QUATERNION = "system: quaternion, rotates: ground_to_image, y_axis: down"
+TO_GROUND = "rotates: image_to_ground, y_axis: up"
+FLIPPED = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
 FORMS = {
     "omega-phi-kappa": ("omega,phi,kappa", euler("XYZ"), "system: omega-phi-kappa"),
     "phi-omega-kappa": ("phi,omega,kappa", euler("YXZ"), "system: phi-omega-kappa"),
@@ -217,23 +211,11 @@ FORMS = {
     "gon": ("omega,phi,kappa", euler("XYZ") / 0.9, "system: omega-phi-kappa, unit: gon"),
     "yaw-pitch-roll": ("yaw,pitch,roll", of_vehicle(DOWN), "system: yaw-pitch-roll, looks: down"),
     "gimbal": ("yaw,pitch,roll", of_vehicle(AHEAD), "system: yaw-pitch-roll, looks: ahead"),
-    "quaternion": (
-        "qw,qx,qy,qz",
-        TRUE.as_quat()[:, [3, 0, 1, 2]],
-        "system: quaternion, rotates: image_to_ground, y_axis: up",
-    ),
-    "quaternion of COLMAP": (
-        "qx,qy,qz,qw",
-        (Rotation.from_matrix(np.diag([1.0, -1.0, -1.0])) * TRUE.inv()).as_quat(),
-        "system: quaternion, rotates: ground_to_image, y_axis: down",
-    ),
-    "matrix": (
-        ",".join(f"r{i}{j}" for i in "123" for j in "123"),
-        TRUE.as_matrix().reshape(-1, 9),
-        "system: matrix, rotates: image_to_ground, y_axis: up",
-    ),
+    "quaternion": ("qw,qx,qy,qz", TRUE.as_quat()[:, [3, 0, 1, 2]], f"system: quaternion, {TO_GROUND}"),
+    "quaternion of COLMAP": ("qx,qy,qz,qw", (FLIPPED * TRUE.inv()).as_quat(), QUATERNION),
+    "matrix": (ELEMENTS, TRUE.as_matrix().reshape(-1, 9), MATRIX),
     "matrix to the image": (
-        ",".join(f"r{i}{j}" for i in "123" for j in "123"),
+        ELEMENTS,
         TRUE.inv().as_matrix().reshape(-1, 9).round(7),
         "system: matrix, rotates: ground_to_image, y_axis: up",
     ),
@@ -282,15 +264,11 @@ def test_standard_deviations_are_those_of_drawn_angles(tmp_path: Path, form: str
     of_rows = f"  sigma: [1, 1, 1]\n  sigma_angles: {sigma.tolist()}\n"
     found = oriented(tmp_path, columns, values, said, of_rows)
     steps = 1e-4 * np.eye(3)
-    turned = [from_angles(*_as_read(tmp_path, form, values + step)) for step in steps]
+    read = [oriented(tmp_path, columns, values + step, said) for step in steps]
+    turned = [from_angles(each.angles, each.system) for each in read]
     rates = [Rotation.from_matrix(TRUE.inv().as_matrix() @ each).as_rotvec(degrees=True) / 1e-4 for each in turned]
     expected = np.sqrt(sum((rate * size) ** 2 for rate, size in zip(rates, sigma, strict=True)))
     np.testing.assert_allclose(np.degrees(found.sigma_turns), expected, rtol=1e-4)
-
-
-def _as_read(folder: Path, form: str, values: Floats) -> tuple[Floats, str]:
-    found = oriented(folder, FORMS[form][0], values, FORMS[form][2])
-    return found.angles, found.system
 
 
 def test_those_of_a_matrix_are_about_the_axes_of_the_photo(tmp_path: Path) -> None:
@@ -300,39 +278,29 @@ def test_those_of_a_matrix_are_about_the_axes_of_the_photo(tmp_path: Path) -> No
     np.testing.assert_allclose(found.sigma_turns * 200 / np.pi, [[0.01, 0.02, 0.04]] * 4, rtol=1e-12)
 
 
-MATRIX = "system: matrix, rotates: image_to_ground, y_axis: up"
-
-
 @pytest.mark.parametrize(
     ("crs", "angles", "row", "place", "words"),
     [
-        ("EPSG:32633", "system: yaw-pitch-roll", "", ":31:", "`looks` is missing"),
-        ("EPSG:32633", "system: matrix, y_axis: up", "", ":31:", "`rotates` is missing"),
-        ("EPSG:32633", "system: quaternion, rotates: ground_to_image", "", ":31:", "`y_axis` is missing"),
-        ("EPSG:32633", "system: omega-phi-kappa, looks: down", "", ":31:", "`looks` says nothing of omega-phi-kappa"),
-        ("local", "system: omega-phi-kappa, north: true", "", ":31:", "nothing says where true north is"),
+        ("EPSG:32633", "system: yaw-pitch-roll", "", "project.yaml:31:", "`looks` is missing"),
+        ("EPSG:32633", "system: matrix, y_axis: up", "", "project.yaml:31:", "`rotates` is missing"),
+        ("EPSG:32633", "system: quaternion, rotates: ground_to_image", "", "project.yaml:31:", "`y_axis` is missing"),
+        (
+            "EPSG:32633",
+            "system: omega-phi-kappa, looks: down",
+            "",
+            "project.yaml:31:",
+            "`looks` says nothing of omega-phi-kappa",
+        ),
+        ("local", "system: omega-phi-kappa, north: true", "", "project.yaml:31:", "nothing says where true north is"),
         ("EPSG:32633", MATRIX, "1,0,0,0,1,0,0,0,-1", "imu.csv:2:12: r11:", "the matrix of photo 1001 is no rotation"),
         ("EPSG:32633", MATRIX, "2,0,0,0,2,0,0,0,2", "imu.csv:2:12: r11:", "without a scale"),
         ("EPSG:32633", MATRIX, "1,0,0,0,1,0,0,0", "imu.csv:1:", "no column `r33`"),
-        (
-            "EPSG:32633",
-            "system: quaternion, rotates: ground_to_image, y_axis: down",
-            "1,1,0,0",
-            "imu.csv:2:12: qw:",
-            "the length of the quaternion of photo 1001 is 0.4142 off 1",
-        ),
+        ("EPSG:32633", QUATERNION, "1,1,0,0", "imu.csv:2:12: qw:", "quaternion of photo 1001 is 0.4142 off 1"),
     ],
 )
 def test_what_is_not_said_or_no_rotation_is_refused(
     tmp_path: Path, crs: str, angles: str, row: str, place: str, words: str
 ) -> None:
-    matrix = [f"r{i}{j}" for i in "123" for j in "123"]
-    columns = "qw,qx,qy,qz" if row.count(",") == 3 else ",".join(matrix[: row.count(",") + 1])
+    columns = "qw,qx,qy,qz" if row.count(",") == 3 else ELEMENTS[: 4 * row.count(",") + 3]
     table = f"photo,x,y,z,{columns}\n1001,1,2,3,{row}\n" if row else "photo,x,y,z,a\n"
-    text = (
-        f'orientations:\n  file: imu.csv\n  crs: "{crs}"\n  axes: [east, north, up]\n  angles: {{{angles}}}\n'
-        "  role: approximate\n"
-    )
-    project = PROJECT.replace("processing:\n", BUNDLE).replace("output:\n", f"{text}output:\n")
-    lines = sample(tmp_path, {**FILES, "project.yaml": project, "imu.csv": table}).lines()
-    assert any(words in line and place in line for line in lines), lines
+    of_table(tmp_path, table, angles, crs=crs).tells(place, words)

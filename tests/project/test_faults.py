@@ -1,19 +1,15 @@
 """One thing wrong in a project that is right otherwise: the words, the place, and nothing else said."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from photostrip.errors import InputError
 from photostrip.project.loading import load_project
-from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, Sample, sample
 
 Y, P, C, F = "project.yaml", "observations.csv", "control.csv", "fiducials.csv"
+SIGMA = "    sigma: [0.05, 0.06, 0.08]\n"
 SECOND_LIST = '  - {file: second.csv, crs: "EPSG:32634", axes: [east, north, up], sigma: [1, 1, 1]}\noutput:'
 
 # The file, what is replaced in it by what, where the fault begins, and words that it must have.
@@ -60,23 +56,23 @@ SCHEMA = [
     (Y, "153.217", "0", "project.yaml:5:25:", "out of range"),
     (
         Y,
-        "    photos: [1001, 1002]\n",
-        "    photos: [1001, 1002]\n    first_photo: {base: 0}\n",
+        "1002]\n",
+        "1002]\n    first_photo: {base: 0}\n",
         "project.yaml:13:25: strips[0].first_photo.base:",
         "out of range",
         "larger than 0",
     ),
     (
         Y,
-        "    photos: [1001, 1002]\n",
-        "    photos: [1001, 1002]\n    first_photo: {angles: [1, 2, 3], unit: grad}\n",
-        "project.yaml:13:44: strips[0].first_photo.unit:",
+        "1002]\n",
+        "1002]\n    first_photo: {unit: grad}\n",
+        "project.yaml:13:25: strips[0].first_photo.unit:",
         "one of deg, gon, rad",
     ),
     (
         Y,
-        "processing:\n",
-        "processing:\n  intersection: right\n",
+        "processing:",
+        "processing:\n  intersection: right",
         "project.yaml:30:17: processing.intersection:",
         "one of mean, left",
     ),
@@ -110,16 +106,16 @@ SCHEMA = [
     (Y, PROJECT[PROJECT.index("cameras:") : PROJECT.index("strips:")], "cameras:\n", "project.yaml:3:9:", "no camera"),
     (
         Y,
-        "processing:\n",
-        "processing:\n  adjustment: covariance\n",
+        "processing:",
+        "processing:\n  adjustment: covariance",
         "project.yaml:30:15: processing.adjustment:",
         "`covariance` is not known",
         "write `bundle`",
     ),
     (
         Y,
-        "processing:\n",
-        "processing:\n  covariance: {distances: false}\n",
+        "processing:",
+        "processing:\n  covariance: {distances: false}",
         "project.yaml:30:3: processing.covariance:",
         "`adjustment: bundle` took its place",
     ),
@@ -144,7 +140,7 @@ SCHEMA = [
     (Y, "0.40", "-0.40", "project.yaml:32:28:", "out of range"),
 ]
 NOT_YET = [
-    (Y, "processing:", "processing:\n  earth_curvature: image", "project.yaml:30:20:", "counted twice", "EPSG:32633"),
+    (Y, "processing:", "processing:\n  earth_curvature: image", "project.yaml:30:20:", "counted twice", "EPSG:32633")
 ]
 REFERENCES = [
     (Y, "id: B\n    camera: RC30", "id: B\n    camera: RC3O", "project.yaml:14:13:", "no camera `RC3O`", "mean `RC30`"),
@@ -222,14 +218,7 @@ TABLES = [
     (C, "P2", "G1", "control.csv:3:1: point:", "G1 is already given in control.csv:2"),
     (C, "500100.12", "500100.12 m", "control.csv:2:4: x:", "unit in it"),
     (C, "500100.12", "500 100.12", "control.csv:2:4: x:", "digits in groups"),
-    (
-        Y,
-        "    sigma: [0.05, 0.06, 0.08]\n",
-        "",
-        "control.csv:2: sx:",
-        "no standard deviation for G1",
-        "sigma: [sx, sy, sz]",
-    ),
+    (Y, SIGMA, "", "control.csv:2: sx:", "no standard deviation for G1", "sigma: [sx, sy, sz]"),
 ]
 MARKS = [
     (F, "1001,F1", "1001,F3", "fiducials.csv:2:6: mark:", "camera RC30 has no mark F3", "one of F1, F2"),
@@ -240,56 +229,31 @@ MARKS = [
     (Y, ", F2: [-106, -106]", "", "project.yaml:8:16: cameras.RC30.fiducials:", "one mark alone"),
     (Y, "  y_axis: up", "  origin: center", "project.yaml:20:11: observations.origin:", "means nothing here"),
     (Y, "{file: fiducials.csv}", "{file: fiducials.csv, unit: px}", "project.yaml:5:5:", "has no pixel_size"),
-    (
-        Y,
-        "{file: fiducials.csv}",
-        "{file: fiducials.csv, unit: um}",
-        "fiducials.csv:2: sx:",
-        "fiducial_measurements.sigma",
-    ),
+    (Y, "fiducials.csv}", "fiducials.csv, unit: um}", "fiducials.csv:2: sx:", "fiducial_measurements.sigma"),
 ]
-ONE_FAULT = [
-    *YAML_SYNTAX,
-    *YAML_MANNERS,
-    *SCHEMA,
-    *NOT_YET,
-    *REFERENCES,
-    *FRAMES,
-    *FILES_NAMED,
-    *TABLES,
-]
-
-
-def check(lines: list[str], place: str, words: tuple[str, ...]) -> None:
-    told = [line for line in lines if line.startswith(place) and all(word in line for word in words)]
-    assert len(told) == 1, "\n".join(lines) or "no fault"
+ONE_FAULT = [*YAML_SYNTAX, *YAML_MANNERS, *SCHEMA, *NOT_YET, *REFERENCES, *FRAMES, *FILES_NAMED, *TABLES]
 
 
 @pytest.mark.parametrize(("file", "old", "new", "place", "words"), [(*case[:4], case[4:]) for case in ONE_FAULT])
 def test_a_wrong_project_is_explained(
-    tmp_path: Path, file: str, old: str, new: str, place: str, words: tuple[str, ...]
+    project: Sample, file: str, old: str, new: str, place: str, words: tuple[str, ...]
 ) -> None:
-    project = sample(tmp_path)
     project.change(file, old, new)
-    check(project.lines(), place, words)
+    project.tells(place, *words)
 
 
 @pytest.mark.parametrize(("file", "old", "new", "place", "words"), [(*case[:4], case[4:]) for case in MARKS])
 def test_wrong_fiducial_marks_are_explained(
-    tmp_path: Path, file: str, old: str, new: str, place: str, words: tuple[str, ...]
+    marked: Sample, file: str, old: str, new: str, place: str, words: tuple[str, ...]
 ) -> None:
-    project = sample(tmp_path, MARKED_FILES)
-    project.change(file, old, new)
-    check(project.lines(), place, words)
+    marked.change(file, old, new)
+    marked.tells(place, *words)
 
 
 @pytest.mark.parametrize("files", [FILES, MARKED_FILES])
 def test_the_samples_are_right(tmp_path: Path, files: dict[str, str]) -> None:
     assert sample(tmp_path, files).lines() == []
     assert (files is FILES) or ("fiducials" in MARKED)
-
-
-# ------------------------------------------------------------------------------------------- whole files
 
 
 # ten copies of ten copies and so on: a file of 200 characters that would fill any memory
@@ -314,10 +278,9 @@ LAUGHS = b"a0: &a0 [1]\n" + b"".join(
         (LAUGHS, "project.yaml:", "more than 100000 values"),
     ],
 )
-def test_what_is_no_project_is_refused(tmp_path: Path, content: bytes, place: str, words: str) -> None:
-    project = sample(tmp_path)
+def test_what_is_no_project_is_refused(project: Sample, content: bytes, place: str, words: str) -> None:
     project.write("project.yaml", content)
-    check(project.lines(), place, (words,))
+    project.tells(place, words)
 
 
 def test_a_project_that_is_too_big_is_not_read(tmp_path: Path) -> None:
@@ -328,30 +291,19 @@ def test_a_project_that_is_too_big_is_not_read(tmp_path: Path) -> None:
         load_project(path)
 
 
-def test_a_missing_project_names_its_neighbour(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_missing_project_names_its_neighbour(project: Sample) -> None:
     with pytest.raises(InputError, match=r"projct\.yaml: does not exist; did you mean `project\.yaml`\?"):
         load_project(project.folder / "projct.yaml")
     with pytest.raises(InputError, match=r"is a folder; expected a file; did you mean `.*/project\.yaml`\?"):
         load_project(project.folder)
 
 
-# -------------------------------------------------------------------------------------- several faults at once
-
-
-def test_faults_of_all_files_come_together(tmp_path: Path) -> None:
-    project = sample(tmp_path, MARKED_FILES)
-    for change in [
-        ("project.yaml", "name: sample", "nmae: sample\nnmae: twice"),
-        ("project.yaml", "153.217", "153,217"),
-        ("project.yaml", "EPSG:32633", "EPSG:99999"),
-        ("observations.csv", "-20.25", "-20,25"),
-        ("observations.csv", "-79.5", "x"),
-        ("fiducials.csv", "2002,F1", "2002,F7"),
-        ("control.csv", "xyz", "yes"),
-    ]:
-        project.change(*change)
-    starts = [line.partition(" ")[0] for line in project.lines()]
+def test_faults_of_all_files_come_together(marked: Sample) -> None:
+    marked.change(Y, "name: sample", "nmae: sample\nnmae: twice", "153.217", "153,217", "EPSG:32633", "EPSG:99999")
+    marked.change(P, "-20.25", "-20,25", "-79.5", "x")
+    marked.change(F, "2002,F1", "2002,F7")
+    marked.change(C, "xyz", "yes")
+    starts = [line.partition(" ")[0] for line in marked.lines()]
     assert starts == [
         "project.yaml:2:1:",
         "project.yaml:3:1:",
@@ -364,8 +316,7 @@ def test_faults_of_all_files_come_together(tmp_path: Path) -> None:
     ]
 
 
-def test_the_same_point_in_two_control_lists_is_refused(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_the_same_point_in_two_control_lists_is_refused(project: Sample) -> None:
     project.change("project.yaml", "output:", SECOND_LIST)
     project.write("second.csv", "point,x,y,z\nN1,1,2,3\nG1,4,5,6\n")
     assert project.lines() == [
@@ -375,8 +326,7 @@ def test_the_same_point_in_two_control_lists_is_refused(tmp_path: Path) -> None:
     assert project.lines() == []
 
 
-def test_a_wrong_export_is_told_once_and_counted(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_wrong_export_is_told_once_and_counted(project: Sample) -> None:
     rows = "".join(f"1001,N{i},{i};5,0\n" for i in range(5000))
     project.write("observations.csv", "photo,point,x,y\n" + rows)
     lines = project.lines()
@@ -384,8 +334,7 @@ def test_a_wrong_export_is_told_once_and_counted(tmp_path: Path) -> None:
     assert "observations.csv: and 4800 more faults in this file" in lines
 
 
-def test_no_photo_of_the_strips_is_measured(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_no_photo_of_the_strips_is_measured(project: Sample) -> None:
     table = "photo,point,x,y\nIMG_1.tif,P1,1,2\nIMG_2.tif,P1,1,2\n"
     project.write("observations.csv", table)
     message = "observations.csv has no point on any photo of the strips; its photos are IMG_1.tif, IMG_2.tif"
@@ -393,8 +342,7 @@ def test_no_photo_of_the_strips_is_measured(tmp_path: Path) -> None:
     assert project.lines() == [f"project.yaml:10:3: strips: {message}; {fix}"]
 
 
-def test_a_photo_under_another_name_is_suggested(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_a_photo_under_another_name_is_suggested(project: Sample) -> None:
     text = (project.folder / "observations.csv").read_text(encoding="utf-8").replace("2002,", "2002.TIF,")
     project.write("observations.csv", text)
     assert project.lines() == [
@@ -402,22 +350,21 @@ def test_a_photo_under_another_name_is_suggested(tmp_path: Path) -> None:
     ]
 
 
-def test_pixels_ask_for_everything_they_need(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    project.change("project.yaml", "  unit: mm\n  y_axis: up\n", "  unit: px\n")
-    project.change("project.yaml", "    format: [230, 230]\n", "")
-    keys = [fault.key for fault in project.faults()]
-    assert keys == ["cameras.RC30.pixel_size", "cameras.RC30.format", "observations.y_axis"]
+@pytest.mark.parametrize(
+    ("texts", "keys"),
+    [
+        (
+            ("  unit: mm\n  y_axis: up\n", "  unit: px\n", "    format: [230, 230]\n", ""),
+            ["cameras.RC30.pixel_size", "cameras.RC30.format", "observations.y_axis"],
+        ),
+        (("  unit: mm\n", "  unit: mm\n  origin: first-pixel\n"), ["cameras.RC30.pixel_size"]),
+    ],
+)
+def test_pixels_ask_for_everything_they_need(project: Sample, texts: tuple[str, ...], keys: list[str]) -> None:
+    project.change(Y, *texts)
+    assert [fault.key for fault in project.faults()] == keys
 
 
-def test_first_pixel_needs_the_size_of_a_pixel(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    project.change("project.yaml", "  unit: mm\n", "  unit: mm\n  origin: first-pixel\n")
-    assert [fault.key for fault in project.faults()] == ["cameras.RC30.pixel_size"]
-
-
-def test_duplicate_keys_do_not_hide_other_faults(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    project.change("project.yaml", "name: sample", "name: a\nname: b")
-    project.change("project.yaml", "unit: mm", "unit: cm")
+def test_duplicate_keys_do_not_hide_other_faults(project: Sample) -> None:
+    project.change(Y, "name: sample", "name: a\nname: b", "unit: mm", "unit: cm")
     assert [fault.code for fault in project.faults()] == ["duplicate-key", "word"]

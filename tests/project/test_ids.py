@@ -1,9 +1,8 @@
 """Whatever surveyors call photos and points comes out as it went in; whatever is done to a project, faults are told."""
 
-from __future__ import annotations
-
 import csv
 import io
+import json
 import re
 import tempfile
 from pathlib import Path
@@ -15,8 +14,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import InputError
 from photostrip.project.loading import Project, load_project
-from tests.fuzzing import TEXTS
-from tests.project.samples import MARKED_FILES, sample
+from tests.project.samples import MARKED_FILES, Sample, sample
 
 ODD = [
     "0123", "NO", "yes", "1:20", "1e3", "0x1F", "0o17", "~", "null", "-1", "+7", "1_000", "1.0", ".5", "=", "-", "--",
@@ -96,48 +94,6 @@ def test_ids_need_no_quotation_marks_in_yaml(tmp_path: Path, name: str) -> None:
 
 
 pytestmark = pytest.mark.slow
-mutations = st.lists(
-    st.tuples(
-        st.sampled_from(sorted(MARKED_FILES)),
-        st.floats(0, 1),
-        st.integers(0, 12),
-        st.one_of(st.sampled_from(TEXTS), st.text(max_size=4)),
-    ),
-    min_size=1,
-    max_size=4,
-)
-
-
-def load(folder: str, files: dict[str, bytes]) -> None:
-    project = sample(Path(folder), {})
-    for name, content in files.items():
-        project.write(name, content)
-    before = {name: (Path(folder) / name).read_bytes() for name in files}
-    assert all(fault.message and fault.file and fault.line >= 0 for fault in project.faults())
-    assert before == {name: (Path(folder) / name).read_bytes() for name in files}
-
-
-@settings(max_examples=60)
-@given(mutations)
-def test_mutated_text(changes: list[tuple[str, float, int, str]]) -> None:
-    files = dict(MARKED_FILES)
-    for name, where, length, text in changes:
-        start = round(where * len(files[name]))
-        files[name] = files[name][:start] + text + files[name][start + length :]
-    with tempfile.TemporaryDirectory() as folder:
-        load(folder, {name: text.encode(errors="replace") for name, text in files.items()})
-
-
-@settings(max_examples=60)
-@given(st.sampled_from(sorted(MARKED_FILES)), st.binary(max_size=200), st.floats(0, 1))
-def test_mutated_bytes(name: str, data: bytes, where: float) -> None:
-    files = {each: text.encode() for each, text in MARKED_FILES.items()}
-    start = round(where * len(files[name]))
-    files[name] = files[name][:start] + data + files[name][start:]
-    with tempfile.TemporaryDirectory() as folder:
-        load(folder, files)
-
-
 words = st.sampled_from(["mm", "px", "A", "RC30", "1001", "0.5", "", "local", "east", "auto", "a.csv", "~", "-1"])
 trees = st.recursive(
     words,
@@ -145,40 +101,17 @@ trees = st.recursive(
     max_leaves=6,
 )
 PATHS = [
-    "cameras",
-    "cameras.RC30",
-    "cameras.RC30.fiducials",
-    "cameras.RC30.distortion",
-    "cameras.RC30.distortion.k",
-    "strips",
-    "strips[0]",
-    "strips[0].photos",
-    "strips[1].camera",
-    "observations",
-    "observations.unit",
+    "cameras", "cameras.RC30", "cameras.RC30.fiducials", "cameras.RC30.distortion", "cameras.RC30.distortion.k",
+    "strips", "strips[0]", "strips[0].photos", "strips[1].camera", "observations", "observations.unit",
     "observations.file",
-    "fiducial_measurements",
-    "control",
-    "control[0]",
-    "control[0].axes",
-    "control[0].crs",
-    "control[0].sigma",
-    "output",
-    "output.crs",
-    "output.axes",
-    "processing",
-    "processing.relative",
-    "processing.polynomial",
-    "tolerances",
-    "name",
-]
+    "fiducial_measurements", "control", "control[0]", "control[0].axes", "control[0].crs", "control[0].sigma", "output",
+    "output.crs", "output.axes", "processing", "processing.relative", "processing.polynomial", "tolerances", "name",
+]  # fmt: skip
 
 
 @settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(PATHS), trees), min_size=1, max_size=3))
 def test_any_tree_at_any_key(changes: list[tuple[str, object]]) -> None:
-    import json
-
     with tempfile.TemporaryDirectory() as folder:
         project = sample(Path(folder), MARKED_FILES)
         faults = project.faults([f"{path}={json.dumps(value)}" for path, value in changes])
@@ -186,7 +119,6 @@ def test_any_tree_at_any_key(changes: list[tuple[str, object]]) -> None:
 
 
 @pytest.mark.parametrize("assignment", ["", "=", ".", "[0]=1", "a=b=c", "cameras.=1", '"="=1', "strips[999999]=1"])
-def test_odd_overrides(tmp_path: Path, assignment: str) -> None:
-    project = sample(tmp_path)
+def test_odd_overrides(project: Sample, assignment: str) -> None:
     with pytest.raises(InputError):
         project.load([assignment])

@@ -1,21 +1,15 @@
 """Projects of model coordinates: what is read, and every way to get it wrong, with message and place."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from photostrip.errors import InputError
 from photostrip.pipeline.run import triangulate
+from photostrip.points import ModelPoints
 from photostrip.project.check import check_project
-from photostrip.project.loading import load_project
 from tests.loops import nonempty
-from tests.project.samples import Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from tests.project.samples import sample
 
 PROJECT = """\
 photostrip: 1
@@ -58,6 +52,31 @@ P, M, C = "project.yaml", "models.csv", "control.csv"
 CENTER_ROWS = [line for line in MODELS.splitlines() if line.split(",")[1] in CENTERS]
 
 
+REFUSED = "needs-image-coordinates"
+PLAIN_SIGMA, IMAGES = "  sigma: [0.01, 0.01, 0.02]\n", "observations: {file: a.csv, unit: mm, sigma: 1}\n"
+
+
+def said(*texts: str) -> dict[str, str]:
+    """The project with texts replaced, each by the one after it."""
+    text = PROJECT
+    for old, new in zip(texts[::2], texts[1::2], strict=True):
+        assert old in text
+        text = text.replace(old, new)
+    return {P: text}
+
+
+def listing(models: str) -> dict[str, str]:
+    """The project with the models of its strip listed."""
+    return said("photos: [1, 2, 3]", f"photos: [1, 2, 3]\n    models: {models}")
+
+
+def measured(folder: Path, files: dict[str, str] | None = None) -> ModelPoints:
+    """Load the project with some files in place of others."""
+    models = sample(folder, FILES | (files or {})).load().inputs.models
+    assert models is not None
+    return models.points
+
+
 def test_the_sample_is_right(tmp_path: Path) -> None:
     project = sample(tmp_path, FILES).load()
     assert project.inputs.models is not None
@@ -74,23 +93,19 @@ def test_the_sample_is_right(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "factor"), [("um", 1e-3), ("m", 1e3)])
 def test_units(tmp_path: Path, unit: str, factor: float) -> None:
-    found = sample(tmp_path, {**FILES, P: PROJECT.replace("unit: mm", f"unit: {unit}")}).load().inputs.models
-    plain = sample(tmp_path, FILES).load().inputs.models
-    assert found is not None
-    assert plain is not None
-    np.testing.assert_allclose(found.points.xyz, plain.points.xyz * factor, rtol=1e-12)
-    np.testing.assert_allclose(found.points.sigma, plain.points.sigma * factor, rtol=1e-12)
+    found, plain = measured(tmp_path, said("unit: mm", f"unit: {unit}")), measured(tmp_path)
+    np.testing.assert_allclose(found.xyz, plain.xyz * factor, rtol=1e-12)
+    np.testing.assert_allclose(found.sigma, plain.sigma * factor, rtol=1e-12)
 
 
 def test_covariances_become_correlations_in_the_axes_of_the_models(tmp_path: Path) -> None:
-    text = PROJECT.replace("  sigma: [0.01, 0.01, 0.02]\n", "  sigma: [0.01, 0.02, 0.03]\n  axes: left-handed\n")
+    project = said(PLAIN_SIGMA, "  sigma: [0.01, 0.02, 0.03]\n  axes: left-handed\n")
     lines = [line + ",0.01,0.02,0.03,0.0001,,-0.0003" for line in MODELS.splitlines()[1:]]
     header = "model,point,x,y,z,sx,sy,sz,cov_xy,cov_xz,cov_yz"
-    models = sample(tmp_path, {**FILES, P: text, M: "\n".join([header, *lines]) + "\n"}).load().inputs.models
-    assert models is not None
-    assert models.points.correlation is not None
+    found = measured(tmp_path, {**project, M: "\n".join([header, *lines]) + "\n"}).correlation
+    assert found is not None
     expected = [[1.0, -0.5, 0.0], [-0.5, 1.0, 0.5], [0.0, 0.5, 1.0]]  # y is turned over
-    np.testing.assert_allclose(models.points.correlation, np.tile(expected, (16, 1, 1)))
+    np.testing.assert_allclose(found, np.tile(expected, (16, 1, 1)))
 
 
 @pytest.mark.parametrize(
@@ -101,9 +116,8 @@ def test_covariances_of_no_coordinates_are_refused(tmp_path: Path, cells: str, w
     lines[0] += ",sx,sy,sz,cov_xy,cov_xz,cov_yz"
     lines[1:] = [line + ",,,,,," for line in lines[1:]]
     lines[3] = MODELS.splitlines()[3] + "," + cells
-    with pytest.raises(InputError, match=words) as told:
-        sample(tmp_path, {**FILES, M: "\n".join(lines) + "\n"}).load()
-    assert [(fault.code, fault.line) for fault in told.value.faults] == [("wrong-covariance", 4)]
+    (fault,) = sample(tmp_path, FILES | {M: "\n".join(lines) + "\n"}).faults()
+    assert (fault.code, fault.line, words in fault.message) == ("wrong-covariance", 4, True)
 
 
 def test_left_handed_axes_are_turned_over(tmp_path: Path) -> None:
@@ -121,21 +135,15 @@ def test_centers_in_a_table_of_their_own(tmp_path: Path) -> None:
         "  unit: mm", "  centers: {file: centers.csv}\n  center_sigma: [0.03, 0.03, 0.04]\n  unit: mm"
     )
     centers = "\n".join(["model,photo,x,y,z", *CENTER_ROWS]) + "\n"
-    apart = sample(tmp_path, {**FILES, P: text, M: rest, "centers.csv": centers}).load().inputs.models
-    together = sample(tmp_path / "other", FILES).load().inputs.models
-    assert apart is not None
-    assert together is not None
-    assert sorted(apart.points.node.tolist()) == sorted(together.points.node.tolist())
-    assert apart.points.sigma[apart.points.node >= 9].tolist() == [[0.03, 0.03, 0.04]] * 4
+    apart = measured(tmp_path, {P: text, M: rest, "centers.csv": centers})
+    assert sorted(apart.node.tolist()) == sorted(measured(tmp_path / "other").node.tolist())
+    assert apart.sigma[apart.node >= 9].tolist() == [[0.03, 0.03, 0.04]] * 4
 
 
 def test_the_resolved_project_reads_as_the_same(tmp_path: Path) -> None:
-    text = PROJECT.replace("photos: [1, 2, 3]", "photos: [1, 2, 3]\n    models: ['12', '23']")
-    first = sample(tmp_path, {**FILES, P: text}).load()
-    assert "links:" in first.resolved
-    assert "relative:" not in first.resolved
-    (tmp_path / P).write_text(first.resolved, encoding="utf-8")
-    assert Sample(tmp_path).load().resolved == first.resolved
+    resolved = sample(tmp_path, FILES | listing("['12', '23']")).reads_as_the_same()
+    assert "links:" in resolved
+    assert "relative:" not in resolved
 
 
 def test_other_names_of_columns_and_rows_of_their_own(tmp_path: Path) -> None:
@@ -144,9 +152,7 @@ def test_other_names_of_columns_and_rows_of_their_own(tmp_path: Path) -> None:
     )
     lines = table("model,Punkt,x,y,H").splitlines()
     own = [f"{lines[0]},sx,sy,sz", *(f"{line},0.01,0.02,0.03" for line in lines[1:])]
-    found = sample(tmp_path, {**FILES, P: text, M: "\n".join(own) + "\n"}).load().inputs.models
-    assert found is not None
-    assert found.points.sigma[3].tolist() == [0.01, 0.02, 0.03]
+    assert measured(tmp_path, {P: text, M: "\n".join(own) + "\n"}).sigma[3].tolist() == [0.01, 0.02, 0.03]
     told = check_project(tmp_path / P).document["model_sigma"]
     assert (told["rows_with_own"], told["rows_with_default"]) == (len(lines) - 1, 0)
 
@@ -160,125 +166,70 @@ def blocks() -> str:
 
 
 def test_a_file_of_blocks_is_the_same(tmp_path: Path) -> None:
-    given = sample(tmp_path, {**FILES, M: blocks()}).load().inputs.models
-    plain = sample(tmp_path / "plain", FILES).load().inputs.models
-    assert given is not None
-    assert plain is not None
-    assert given.points.xyz.tolist() == plain.points.xyz.tolist()
-    assert given.points.node.tolist() == plain.points.node.tolist()
+    given, plain = measured(tmp_path, {M: blocks()}), measured(tmp_path / "plain")
+    assert given.xyz.tolist() == plain.xyz.tolist()
+    assert given.node.tolist() == plain.node.tolist()
 
 
 def test_faults_of_blocks_have_their_line(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as told:
-        sample(tmp_path, {**FILES, M: blocks().replace("B2  89.000000", "B2  89,0")}).load()
-    lines = blocks().splitlines()
-    assert {fault.line for fault in told.value.faults} == {
-        k for k, line in enumerate(lines, 1) if line.startswith("B2  89")
-    }
+    faults = sample(tmp_path, FILES | {M: blocks().replace("B2  89.000000", "B2  89,0")}).faults()
+    lines = enumerate(blocks().splitlines(), 1)
+    assert {fault.line for fault in faults} == {number for number, line in lines if line.startswith("B2  89")}
 
 
 def without(*starts: str) -> str:
     return "\n".join(line for line in MODELS.splitlines() if not line.startswith(starts)) + "\n"
 
 
-FAULTS = [
-    ("missing file", {M: None}, "file-missing", "project.yaml:7:9", "models.file"),
-    ("empty", {M: ""}, "file-empty", "project.yaml:7:9", "models.csv is empty"),
-    ("header alone", {M: "model,point,x,y,z\n"}, "no-rows", "models.csv:1", "no rows"),
-    ("binary", {M: "\x00\x01\x02PK"}, "binary", "project.yaml:7:9", "NUL bytes"),
-    ("truncated", {M: MODELS[:-30]}, "row-length", "models.csv:17", "fields"),
-    ("no number", {M: MODELS.replace("50.000000", "nan", 1)}, "number", "models.csv:2:", "not a measured value"),
-    ("a comma", {M: MODELS.replace("0.000000,50.000000", '0.000000,"50,0"', 1)}, "number", "models.csv:2:", "50,0"),
-    ("column missing", {M: table("model,point,x,y,h")}, "missing-column", "models.csv:1", "`z`"),
-    (
-        "a point twice",
-        {M: MODELS + "23,C1,1,2,3\n"},
-        "measured-twice",
-        "models.csv:18:4",
-        "already measured in model 23, in line 13",
-    ),
-    ("a model twice", {M: MODELS + without("model", "12")}, "model-twice", "models.csv:18", "model 23 appears twice"),
-    ("unknown key", {P: PROJECT.replace("unit: mm", "unit: mm\n  scal: 3")}, "unknown-key", "project.yaml:9:3", "scal"),
-    ("unit", {P: PROJECT.replace("unit: mm", "unit: cm")}, "word", "project.yaml:8:9", "cm"),
-    ("no unit", {P: PROJECT.replace("  unit: mm\n", "")}, "missing-key", "project.yaml", "`unit` is missing"),
-    ("axes", {P: PROJECT.replace("unit: mm", "unit: mm\n  axes: up")}, "word", "project.yaml:9:9", "right-handed"),
-    ("no sigma", {P: PROJECT.replace("  sigma: [0.01, 0.01, 0.02]\n", "")}, "no-sigma", "models.csv:2", "models.sigma"),
-    ("sigma 0", {P: PROJECT.replace("[0.01, 0.01, 0.02]", "[0.01, 0, 0.02]")}, "range", "project.yaml:9:17", "larger"),
-    ("alpha", {P: PROJECT + "processing: {links: {alpha: 2}}\n"}, "range", "project.yaml:15:29", "between 0 and 1"),
-    ("no center", {M: without("12,2,")}, "no-model", "project.yaml:5:17", "photos 1 and 2"),
-    ("another center", {M: MODELS.replace("12,2,", "12,3,")}, "no-model", "project.yaml:5:17", "photos 1 and 2"),
-    ("three centers", {M: MODELS + "23,1,5,5,5\n"}, "too-many-centers", "models.csv:18", "3 perspective centres"),
-    (
-        "two models of a pair",
-        {M: MODELS + "9,2,1,2,3\n9,3,1,2,4\n9,B1,3,3,3\n"},
-        "model-twice",
-        "project.yaml:5:20",
-        "models 23, 9 have the perspective centres",
-    ),
-    (
-        "images as well",
-        {P: PROJECT + "observations: {file: a.csv, unit: mm, sigma: 1}\n", "a.csv": "photo,point,x,y\n1,A1,0,0\n"},
-        "photos-and-models",
-        "project.yaml:15",
-        "exclude each other",
-    ),
-    (
-        "refraction",
-        {P: PROJECT + "processing: {refraction: true}\n"},
-        "needs-image-coordinates",
-        "project.yaml:15",
-        "refr",
-    ),
-    (
-        "first photo",
-        {P: PROJECT.replace("id: A\n", "id: A\n    first_photo: {base: 92}\n", 1)},
-        "needs-image-coordinates",
-        "project.yaml:",
-        "first_photo",
-    ),
-]
-
-
-@pytest.mark.parametrize(("files", "code", "place", "words"), [each[1:] for each in FAULTS], ids=[f[0] for f in FAULTS])
-def test_what_is_refused(tmp_path: Path, files: dict[str, str | None], code: str, place: str, words: str) -> None:
-    given = {name: text for name, text in {**FILES, **files}.items() if text is not None}
-    tmp_path.mkdir(exist_ok=True)
-    for name, text in given.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    with pytest.raises(InputError) as told:
-        load_project(tmp_path / P)
-    found = [fault for fault in told.value.faults if fault.code == code]
-    assert found, [str(fault) for fault in told.value.faults]
-    text = str(found[0]).replace(f"{tmp_path}/", "")
-    assert text.startswith(place), text
-    assert words in text
-
-
-LISTED = "photos: [1, 2, 3]\n    models: {}"
-
-
 @pytest.mark.parametrize(
-    ("models", "code", "words"),
+    ("files", "code", "place", "words"),
     [
-        ("['23', '12']", "wrong-center", "is listed between photos 1 and 2, and has the perspective centre of 3"),
-        ("['12']", "length", "1 model listed for 3 photos"),
-        ("['12', '32']", "unknown-model", "model 32 is not measured"),
-        ("['12', '12']", "model-twice", "model 12 appears twice in the strips"),
+        ({M: "model,point,x,y,z\n"}, "no-rows", "models.csv:1", "no rows"),
+        ({M: MODELS[:-30]}, "row-length", "models.csv:17", "fields"),
+        ({M: MODELS.replace("50.000000", "nan", 1)}, "number", "models.csv:2:", "not a measured value"),
+        ({M: MODELS.replace("0.000000,50.000000", '0.000000,"50,0"', 1)}, "number", "models.csv:2:", "50,0"),
+        ({M: table("model,point,x,y,h")}, "missing-column", "models.csv:1", "`z`"),
+        ({M: MODELS + "23,C1,1,2,3\n"}, "measured-twice", "models.csv:18:4", "measured in model 23, in line 13"),
+        ({M: MODELS + without("model", "12")}, "model-twice", "models.csv:18", "model 23 appears twice"),
+        (said("unit: mm", "unit: cm"), "word", "project.yaml:8:9", "cm"),
+        (said("  unit: mm\n", ""), "missing-key", "project.yaml", "`unit` is missing"),
+        (said("unit: mm", "unit: mm\n  axes: up"), "word", "project.yaml:9:9", "right-handed"),
+        (said(PLAIN_SIGMA, ""), "no-sigma", "models.csv:2", "models.sigma"),
+        (said("[0.01, 0.01, 0.02]", "[0.01, 0, 0.02]"), "range", "project.yaml:9:17", "larger"),
+        ({P: PROJECT + "processing: {links: {alpha: 2}}\n"}, "range", "project.yaml:15:29", "between 0 and 1"),
+        ({M: without("12,2,")}, "no-model", "project.yaml:5:17", "photos 1 and 2"),
+        ({M: MODELS.replace("12,2,", "12,3,")}, "no-model", "project.yaml:5:17", "photos 1 and 2"),
+        ({M: MODELS + "23,1,5,5,5\n"}, "too-many-centers", "models.csv:18", "3 perspective centres"),
+        ({M: MODELS + "9,2,1,2,3\n9,3,1,2,4\n9,B1,3,3,3\n"}, "model-twice", "project.yaml:5:20", "models 23, 9 have"),
+        (
+            {P: PROJECT + IMAGES, "a.csv": "photo,point,x,y\n1,A1,0,0\n"},
+            "photos-and-models",
+            "project.yaml:15",
+            "exclude",
+        ),
+        ({P: PROJECT + "processing: {refraction: true}\n"}, REFUSED, "project.yaml:15", "refraction"),
+        (said("id: A\n", "id: A\n    first_photo: {base: 92}\n"), REFUSED, "project.yaml:5:18", "first_photo"),
+        (listing("['23', '12']"), "wrong-center", "project.yaml:6", "between photos 1 and 2, and has"),
+        (listing("['12']"), "length", "project.yaml:6", "1 model listed for 3 photos"),
+        (listing("['12', '32']"), "unknown-model", "project.yaml:6", "model 32 is not measured"),
+        (listing("['12', '12']"), "model-twice", "project.yaml:6", "model 12 appears twice in the strips"),
     ],
 )
-def test_models_that_are_listed_wrongly(tmp_path: Path, models: str, code: str, words: str) -> None:
-    text = PROJECT.replace("photos: [1, 2, 3]", LISTED.format(models))
-    with pytest.raises(InputError) as told:
-        sample(tmp_path, {**FILES, P: text}).load()
-    assert [fault.code for fault in told.value.faults if words in fault.message] == [code]
+def test_what_is_refused(tmp_path: Path, files: dict[str, str], code: str, place: str, words: str) -> None:
+    project = sample(tmp_path, FILES | files)
+    project.tells(place, words)
+    assert code in {fault.code for fault in project.faults()}
 
 
 def test_the_keys_of_images_are_still_asked_for(tmp_path: Path) -> None:
-    text = PROJECT.replace("models:\n  file: models.csv\n  unit: mm\n  sigma: [0.01, 0.01, 0.02]\n", "")
-    with pytest.raises(InputError) as told:
-        sample(tmp_path, {**FILES, P: text}).load()
-    missing = {fault.key for fault in told.value.faults if fault.code == "missing-key"}
-    assert missing == {"cameras", "observations", "strips[0].camera"}
+    project = sample(
+        tmp_path, FILES | said("models:\n  file: models.csv\n  unit: mm\n  sigma: [0.01, 0.01, 0.02]\n", "")
+    )
+    assert {fault.key for fault in project.faults() if fault.code == "missing-key"} == {
+        "cameras",
+        "observations",
+        "strips[0].camera",
+    }
 
 
 def test_what_is_not_used_is_told(tmp_path: Path) -> None:
@@ -294,16 +245,10 @@ def test_what_is_not_used_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("models", "code"),
-    [
-        (without("23,B2", "23,B3", "23,2"), "broken-link"),
-        (MODELS.replace("23,2,", "23,Q,"), "no-model"),
-    ],
+    [(without("23,B2", "23,B3", "23,2"), "broken-link"), (MODELS.replace("23,2,", "23,Q,"), "no-model")],
 )
 def test_check_tells_links_that_cannot_be(tmp_path: Path, models: str, code: str) -> None:
-    text = PROJECT.replace("photos: [1, 2, 3]", "photos: [1, 2, 3]\n    models: ['12', '23']")
-    if code == "no-model":
-        text = PROJECT
-    sample(tmp_path, {**FILES, P: text, M: models})
+    sample(tmp_path, FILES | {M: models} | (listing("['12', '23']") if code == "broken-link" else {}))
     assert code in {fault.code for fault in check_project(tmp_path / P).faults}
 
 

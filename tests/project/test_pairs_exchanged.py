@@ -3,10 +3,8 @@
 Neither they nor any other fault of a project hide image coordinates in another unit.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,11 +16,8 @@ from photostrip.project.check import check_project
 from photostrip.simulation import Flight, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
-from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
+from tests.project.samples import OBSERVATIONS, Sample
 from tests.simulated import inputs_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SIGMA = 0.005  # mm
 PAIRS = 5
@@ -53,38 +48,27 @@ def faults(tmp_path: Path, listing: tuple[str, frozenset[str]]) -> list[tuple[st
     return [(each.code, each.message) for each in findings.faults]
 
 
-@pytest.mark.parametrize("number", [0, 2, 4])
-def test_one_exchanged_pair_is_named(tmp_path: Path, number: int) -> None:
-    """It was told as one line for each of its points, none of which named the pair."""
-    ((code, message),) = faults(tmp_path, listed({number}))
-    assert code == "pair-exchanged"
-    assert f"photos 100{number + 1} and 100{number + 2} are exchanged in their pair" in message
-
-
-def test_all_pairs_exchanged_are_told_once(tmp_path: Path) -> None:
-    """The columns of left and right are exchanged."""
-    ((code, message),) = faults(tmp_path, listed(set(range(PAIRS))))
-    assert code == "pair-exchanged"
-    assert "in every pair" in message
+@pytest.mark.parametrize(
+    ("exchanged", "factor", "noise", "code", "words"),
+    [
+        *(({n}, 1.0, SIGMA, "pair-exchanged", f"photos 100{n + 1} and 100{n + 2} are exchanged") for n in (0, 2, 4)),
+        (set(range(PAIRS)), 1.0, SIGMA, "pair-exchanged", "in every pair"),
+        (set(), 1000.0, SIGMA, "measurements-disagree", "the unit or the standard deviation is wrong"),
+        # coordinates of photos laid in anew scatter by a millimetre: they are in no common system
+        (set(), 1.0, 1.0, "measurements-disagree", ""),
+    ],
+)
+def test_what_is_the_matter_is_told_once(
+    tmp_path: Path, exchanged: set[int], factor: float, noise: float, code: str, words: str
+) -> None:
+    ((found, message),) = faults(tmp_path, listed(exchanged, factor=factor, noise=noise))
+    assert found == code
+    assert words in message
+    assert noise == SIGMA or "agree as measurements do" not in message
 
 
 def test_sound_pairs_are_read(tmp_path: Path) -> None:
-    """Nothing is refused."""
     assert faults(tmp_path, listed(set())) == []
-
-
-def test_another_unit_is_told_as_one(tmp_path: Path) -> None:
-    """Every measurement was refused by itself, and the unit never named."""
-    ((code, message),) = faults(tmp_path, listed(set(), factor=1000.0))
-    assert code == "measurements-disagree"
-    assert "the unit or the standard deviation is wrong" in message
-
-
-def test_photos_laid_in_anew_are_told_once(tmp_path: Path) -> None:
-    """Coordinates that scatter by a millimetre are in no common system."""
-    ((code, message),) = faults(tmp_path, listed(set(), noise=1.0))
-    assert code == "measurements-disagree"
-    assert "agree as measurements do" not in message
 
 
 def told(project: Sample) -> tuple[list[str], list[str]]:
@@ -97,10 +81,9 @@ def told(project: Sample) -> tuple[list[str], list[str]]:
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1.0, []), (10.0, ["P101"]), (0.1, ["P101"])])
-def test_an_exchanged_pair_does_not_hide_the_unit(tmp_path: Path, factor: float, unit: list[str]) -> None:
+def test_an_exchanged_pair_does_not_hide_the_unit(project: Sample, factor: float, unit: list[str]) -> None:
     """It ended the reading before the unit was looked at."""
     listing, photos = listed({2}, factor=factor)
-    project = sample(tmp_path)
     project.write("observations.csv", listing)
     project.change("project.yaml", "[1001, 1002]", f"[{', '.join(sorted(photos))}]")
     project.change("project.yaml", "  - id: B\n    camera: RC30\n    photos: [2001, 2002]\n", "")
@@ -122,29 +105,26 @@ FAULTS = [
 @pytest.mark.parametrize(("file", "old", "new", "code"), FAULTS)
 @pytest.mark.parametrize(("unit", "expected"), [("mm", []), ("um", ["P101"])])
 def test_no_fault_hides_the_unit(
-    tmp_path: Path, file: str, old: str, new: str, code: str, unit: str, expected: list[str]
+    project: Sample, file: str, old: str, new: str, code: str, unit: str, expected: list[str]
 ) -> None:
     """Every fault did, and was told alone."""
-    project = sample(tmp_path)
     project.change("project.yaml", "unit: mm", f"unit: {unit}")
     project.change(file, old, new)
     assert told(project) == ([code], expected)
 
 
-def test_marks_that_orient_no_photo_say_nothing_of_the_unit(tmp_path: Path) -> None:
+def test_marks_that_orient_no_photo_say_nothing_of_the_unit(marked: Sample) -> None:
     """Coordinates of a comparator have their origin anywhere, and were told to reach too far."""
-    project = sample(tmp_path, MARKED_FILES)
     rows = [row.split(",") for row in OBSERVATIONS.split()[1:]]
     lines = ["photo,point,x,y", *(f"{a},{b},{float(x) + 300},{float(y) + 300}" for a, b, x, y in nonempty(rows))]
-    project.write("observations.csv", "\n".join(lines))
-    project.change("fiducials.csv", "2002,F1,106.1,-106\n", "")
-    checked = check_project(project.folder / "project.yaml")
+    marked.write("observations.csv", "\n".join(lines))
+    marked.change("fiducials.csv", "2002,F1,106.1,-106\n", "")
+    checked = check_project(marked.folder / "project.yaml")
     assert "too-few-marks" in {each.code for each in checked.faults}
     assert checked.findings == ()
 
 
-def test_a_header_that_is_there_twice_is_a_fault_of_its_row(tmp_path: Path) -> None:
+def test_a_header_that_is_there_twice_is_a_fault_of_its_row(project: Sample) -> None:
     """Its photo is in no strip, and has no row that is left."""
-    project = sample(tmp_path)
     project.change("observations.csv", "photo,point,x,y\n", "photo,point,x,y\nphoto,point,x,y\n")
     assert told(project) == (["number", "number"], [])

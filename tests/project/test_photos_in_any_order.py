@@ -1,22 +1,15 @@
 """Photos that are listed in no order: how a project gives them their cameras, and what is wrong with one."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.result_json import read_result
-from photostrip.project.loading import load_project
+from photostrip.project.loading import Project
 from tests.project.samples import FILES, OBSERVATIONS, PROJECT, Sample, sample
 from tests.results import spec, write_project
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.project.loading import Project
 
 STRIPS = PROJECT[PROJECT.index("strips:") : PROJECT.index("observations:")]
 SECOND = "  - id: B\n    camera: RC30\n    photos: [2001, 2002]\n"
@@ -70,11 +63,8 @@ def test_each_group_has_its_camera(tmp_path: Path) -> None:
 
 def test_the_resolved_project_lists_them_and_reads_as_the_same(tmp_path: Path) -> None:
     project = with_photos(tmp_path, "{camera: RC30}")
-    before = project.load()
-    assert 'photos: ["1001", "1002", "2001", "2002"]' in before.resolved
-    project.write("project.yaml", before.resolved)
-    again = load_project(tmp_path / "project.yaml")
-    assert (flights(again), again.resolved) == (flights(before), before.resolved)
+    assert 'photos: ["1001", "1002", "2001", "2002"]' in project.reads_as_the_same()
+    assert flights(project.load()) == ALL
 
 
 # What `photos` is, beside which strips, where the fault begins, and words that it must have.
@@ -98,42 +88,35 @@ WRONG = [
 
 @pytest.mark.parametrize(("photos", "strips", "place", "words"), [(*case[:3], case[3:]) for case in WRONG])
 def test_what_is_wrong_with_photos(
-    tmp_path: Path, photos: str, strips: str, place: str, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, photos: str, strips: str, place: str, words: tuple[str, ...]
 ) -> None:
     if strips and not strips.startswith("strips"):
         strips = f"strips:\n{strips}"
     project = with_photos(tmp_path, photos, strips)
-    found = [line for line in project.lines() if line.startswith(place)]
-    assert len(found) == 1
-    assert [word for word in words if word not in found[0]] == []
-    assert main(["run", str(tmp_path / "project.yaml")]) == 2
-    assert f"error: {tmp_path}/{place}" in capsys.readouterr().err
+    project.tells(place, *words)
 
 
 def test_without_photos_of_any_kind(tmp_path: Path) -> None:
     project = sample(tmp_path, {**FILES, "project.yaml": PROJECT.replace(STRIPS, "")})
-    (line,) = project.lines()
-    assert line.startswith("project.yaml:1:1: strips: `strips` is missing; expected photos in flight order by strips;")
+    missing = "project.yaml:1:1: strips: `strips` is missing; expected photos in flight order by strips;"
+    project.tells(missing, alone=True)
     project.change("project.yaml", "name: sample", "stripes: []")
-    (line,) = project.lines()
-    assert "stripes: the key `stripes` is not known; did you mean `strips`?" in line
+    project.tells("", "stripes: the key `stripes` is not known; did you mean `strips`?", alone=True)
 
 
 def test_methods_that_need_strips_are_refused(tmp_path: Path) -> None:
-    (line,) = with_photos(tmp_path, "{camera: RC30}").lines(["processing.adjustment=polynomial"])
-    assert "processing.adjustment: photos in no given order need the bundle adjustment" in line
-    assert line.endswith("expected auto or bundle; or list the photos in flight order in `strips`")
+    message = "processing.adjustment: photos in no given order need the bundle adjustment"
+    cure = "expected auto or bundle; or list the photos in flight order in `strips`"
+    with_photos(tmp_path, "{camera: RC30}").tells("", message, cure, overrides=["processing.adjustment=polynomial"])
 
 
 def test_a_drift_of_photos_in_no_order_needs_times(tmp_path: Path) -> None:
     project = with_photos(tmp_path, "{camera: RC30}")
     positions = "camera_positions: {file: gnss.csv, crs: local, axes: [east, north, up], sigma: [1, 1, 1]}\ncontrol:"
-    project.change("project.yaml", "control:", positions.replace("]}", "], correction: drift}"))
-    project.change("project.yaml", "EPSG:32633", "local")
+    project.change("project.yaml", "control:", positions.replace("]}", "], correction: drift}"), "EPSG:32633", "local")
     project.write("gnss.csv", "photo,x,y,z\n1001,1,2,3\n1002,1,2,3\n")
-    (line,) = project.lines()
-    assert "camera_positions.correction: a drift of photos in no given order needs times" in line
-    assert line.endswith("fill its column time, or write `correction: offset`")
+    message = "camera_positions.correction: a drift of photos in no given order needs times"
+    project.tells("", message, "; fill its column time, or write `correction: offset`", alone=True)
     project.write("gnss.csv", "photo,x,y,z,time\n1001,1,2,3,1\n1002,1,2,3,2\n")
     assert project.lines() == []
 

@@ -1,12 +1,9 @@
 """Presets and overrides: whose value counts, where a fault is told, and what the presets in configs/ do."""
 
-from __future__ import annotations
-
 import json
-import shutil
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -25,8 +22,7 @@ processing:
 """
 
 
-def test_own_values_win_and_mappings_are_merged(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_own_values_win_and_mappings_are_merged(project: Sample) -> None:
     project.write("preset.yaml", PRESET)
     project.change("project.yaml", "name: sample", "extends: preset.yaml")
     settings = project.load().settings
@@ -36,27 +32,23 @@ def test_own_values_win_and_mappings_are_merged(tmp_path: Path) -> None:
     assert project.load().inputs.observations.xy[0].tolist() == [10.5, -20.25]
 
 
-def test_lists_are_replaced(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_lists_are_replaced(project: Sample) -> None:
     project.write("base.yaml", "strips:\n  - {id: Z, camera: Z, photos: [7, 8]}\n")
     project.change("project.yaml", "name: sample", "extends: base.yaml")
     assert [strip.id for strip in project.load().inputs.strips] == ["A", "B"]
 
 
-def test_paths_of_a_preset_are_relative_to_it(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_paths_of_a_preset_are_relative_to_it(project: Sample) -> None:
     old = PROJECT[PROJECT.index("observations:") : PROJECT.index("control:")]
-    project.change("project.yaml", old, "")
-    project.change("project.yaml", "name: sample", "extends: shared/base.yaml")
+    project.change("project.yaml", old, "", "name: sample", "extends: shared/base.yaml")
     project.write("shared/base.yaml", old)
-    (tmp_path / "observations.csv").rename(tmp_path / "shared" / "observations.csv")
+    (project.folder / "observations.csv").rename(project.folder / "shared" / "observations.csv")
     loaded = project.load()
-    assert tmp_path / "shared" / "observations.csv" in loaded.files
+    assert project.folder / "shared" / "observations.csv" in loaded.files
     assert 'file: "shared/observations.csv"' in loaded.resolved
 
 
-def test_faults_of_a_preset_are_told_there(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_faults_of_a_preset_are_told_there(project: Sample) -> None:
     project.write("shared/base.yaml", "photostrip: 1\nprocessing:\n  refracton: true\n  earth_radius: 0\n")
     project.change("project.yaml", "name: sample", "extends: shared/base.yaml\nnmae: x")
     assert project.lines() == [
@@ -66,37 +58,28 @@ def test_faults_of_a_preset_are_told_there(tmp_path: Path) -> None:
     ]
 
 
-def test_syntax_of_a_preset_is_told_there(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    project.write("base.yaml", "photostrip: 1\nname: a: b\n")
+@pytest.mark.parametrize(
+    ("files", "place", "words"),
+    [
+        ({"base.yaml": "photostrip: 1\nname: a: b\n"}, "base.yaml:2:8: ", "colon"),
+        ({"base.yaml": ""}, "project.yaml:2:10: extends: ", "base.yaml is empty"),
+        (
+            {"base.yaml": "extends: b.yaml\n", "b.yaml": "photostrip: 1\nextends: ./base.yaml\n"},
+            "b.yaml:2:10: extends: ",
+            "base.yaml extends itself; remove one `extends`",  # where the circle closes
+        ),
+        (
+            {f"{name}.yaml": f"extends: p{n}.yaml\n" for n, name in enumerate(["base", *(f"p{n}" for n in range(20))])},
+            "",
+            "more than 8 files extend each other",
+        ),
+    ],
+)
+def test_presets_that_cannot_be_read(project: Sample, files: dict[str, str], place: str, words: str) -> None:
+    for name, text in files.items():
+        project.write(name, text)
     project.change("project.yaml", "name: sample", "extends: base.yaml")
-    assert [line.partition(" ")[0] for line in project.lines()] == ["base.yaml:2:8:"]
-
-
-def test_an_empty_preset_is_told_where_it_is_named(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    project.write("base.yaml", "")
-    project.change("project.yaml", "name: sample", "extends: base.yaml")
-    assert project.lines() == ["project.yaml:2:10: extends: base.yaml is empty"]
-
-
-def test_a_circle_of_presets_is_refused_where_it_closes(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    project.write("a.yaml", "extends: b.yaml\n")
-    project.write("b.yaml", "photostrip: 1\nextends: ./a.yaml\n")
-    project.change("project.yaml", "name: sample", "extends: a.yaml")
-    assert project.lines() == ["b.yaml:2:10: extends: a.yaml extends itself; remove one `extends`"]
-
-
-def test_a_long_chain_of_presets_is_refused(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    for number in range(20):
-        project.write(f"p{number}.yaml", f"extends: p{number + 1}.yaml\n")
-    project.change("project.yaml", "name: sample", "extends: p0.yaml")
-    assert "more than 8 files extend each other" in project.lines()[0]
-
-
-# -------------------------------------------------------------------------------------------------- the command line
+    project.tells(place, words, alone=True)
 
 
 @pytest.mark.parametrize(
@@ -108,18 +91,12 @@ def test_a_long_chain_of_presets_is_refused(tmp_path: Path) -> None:
         ('processing."relative".grubbs_alpha=0.04', 0.04),
     ],
 )
-def test_an_override_counts_before_the_file(tmp_path: Path, assignment: str, value: float) -> None:
-    assert sample(tmp_path).load([assignment]).settings.relative.grubbs_alpha == value
+def test_the_last_override_counts_and_before_the_file(project: Sample, assignment: str, value: float) -> None:
+    assert project.load(["processing.relative.grubbs_alpha=0.09", assignment]).settings.relative.grubbs_alpha == value
 
 
-def test_the_last_override_counts(tmp_path: Path) -> None:
-    loaded = sample(tmp_path).load(["processing.adjustment=similarity", "processing.adjustment=polynomial"])
-    assert loaded.settings.adjustment == "polynomial"
-
-
-def test_overrides_reach_lists_and_names_with_signs(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("RC30", "RC.30")
+def test_overrides_reach_lists_and_names_with_signs(project: Sample) -> None:
+    text = (project.folder / "project.yaml").read_text(encoding="utf-8").replace("RC30", "RC.30")
     project.write("project.yaml", text)
     changes = ["strips[0].id=0123", "strips.1.id='~'", 'cameras."RC.30".principal_point[1]=0.5', "control[0].crs=local"]
     inputs = project.load(changes).inputs
@@ -138,10 +115,7 @@ def test_paths_of_overrides_are_relative_to_the_project(tmp_path: Path, monkeypa
 @pytest.mark.parametrize(
     ("assignment", "words"),
     [
-        (
-            "processing.relativ.grubbs_alpha=1",
-            "--set: processing.relativ: the key `relativ` is not known; did you mean",
-        ),
+        ("processing.relativ.grubbs_alpha=1", "--set: processing.relativ: the key `relativ` is not known; did you"),
         ("processing.relative.grubbs_alpha=5", "--set: processing.relative.grubbs_alpha: 5 is out of range"),
         ("processing.relative.grubbs_alpha=", "--set: processing.relative.grubbs_alpha: no value is given"),
         ("processing.adjustment=[a", "--set:1:1: a bracket is not closed"),
@@ -158,105 +132,94 @@ def test_paths_of_overrides_are_relative_to_the_project(tmp_path: Path, monkeypa
     ],
 )
 def test_a_wrong_override_is_told_at_set(tmp_path: Path, assignment: str, words: str) -> None:
-    lines = sample(tmp_path).lines([assignment])
-    assert len(lines) == 1
-    assert lines[0].startswith(words)
-
-
-FILES_OF_PRESETS = sorted((ROOT / "configs").glob("*.yaml"))
-SCALE = {
-    "film-archive": 1,
-    "film-mapping": 1,
-    "digital-frame": 0.01,
-    "uav-corridor": 0.01,
-    "teaching": 1,
-    "as-printed": 1,
-}
-SIGMA = {"film-archive": 0.010, "film-mapping": 0.005, "digital-frame": 0.003, "uav-corridor": 0.005, "teaching": 0.010}
-SIGMA["as-printed"] = SIGMA["teaching"]
-
-
-def completed_by(folder: Path, preset: Path, files: dict[str, str]) -> Sample:
-    """Write a project that takes everything else from a preset."""
-    project = sample(folder, files)
-    text = (folder / "project.yaml").read_text(encoding="utf-8")
-    text = text.replace("photostrip: 1\n", f"photostrip: 1\nextends: presets/{preset.name}\n")
-    text = text.replace("  unit: mm\n  y_axis: up\n  sigma: 0.005\n", "")
-    text = text.replace("    format: [230, 230]\n", "    format: [230, 230]\n    pixel_size: 0.01\n")
-    project.write("project.yaml", text[: text.index("output:")])
-    (folder / "presets").mkdir()
-    shutil.copy(preset, folder / "presets")
-    return project
-
-
-@pytest.mark.parametrize("preset", FILES_OF_PRESETS, ids=lambda path: path.stem)
-def test_a_preset_completes_a_project(tmp_path: Path, preset: Path) -> None:
-    loaded = completed_by(tmp_path, preset, FILES).load()
-    assert loaded.hints == ()
-    assert loaded.inputs.observations.sigma[0, 0] == pytest.approx(SIGMA[preset.stem], rel=1e-12)
-    left, right = loaded.inputs.observations.xy[[0, 2], 0]
-    assert left - right == pytest.approx(91.0 * SCALE[preset.stem])
-
-
-@pytest.mark.parametrize("preset", [p for p in FILES_OF_PRESETS if "film" in p.stem], ids=lambda path: path.stem)
-def test_film_presets_take_fiducial_marks(tmp_path: Path, preset: Path) -> None:
-    assert completed_by(tmp_path, preset, MARKED_FILES).load().inputs.fiducials is not None
-
-
-def test_a_standard_deviation_never_takes_its_unit_from_another_file(tmp_path: Path) -> None:
-    preset = ROOT / "configs" / "film-mapping.yaml"
-    project = completed_by(tmp_path, preset, FILES)
-    project.change("project.yaml", "  file: observations.csv", "  file: observations.csv\n  unit: px\n  y_axis: down")
-    message = "sigma stands in presets/film-mapping.yaml, its unit in project.yaml; write both in one file"
-    assert project.lines() == [f"presets/film-mapping.yaml:9:10: observations.sigma: {message}"]
-    assert project.load(["observations.sigma=0.3"]).inputs.observations.sigma[0, 0] == pytest.approx(0.003)
-    assert PROJECT.count("unit: mm") == 1
-
-
-def test_a_unit_on_the_command_line_needs_its_standard_deviation_there(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    assert len(project.lines(["observations.unit=um"])) == 1
-    assert project.lines(["observations.unit=um", "observations.sigma=5"]) == []
+    sample(tmp_path).tells(words, overrides=[assignment], alone=True)
 
 
 CONFIGS = ROOT / "configs"
-GROSS = 40  # standard deviations
-OWN = ("  unit:", "  y_axis:", "  origin:", "  sigma: 0")  # of the observations: the preset says them
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """What a preset is made for: camera, standard deviation of image coordinates, further points of each model."""
 
     camera: str
     sigma_um: float
     points: int
     refraction: bool
+    sigma_mm: float  # where a pixel has 0.01 mm
 
 
 KINDS = {
-    "film-archive": Kind("film", 10.0, 12, refraction=True),
-    "film-mapping": Kind("film", 5.0, 12, refraction=True),
-    "digital-frame": Kind("digital", 1.8, 12, refraction=True),
-    "uav-corridor": Kind("digital", 3.0, 60, refraction=False),
-    "teaching": Kind("film", 10.0, 12, refraction=False),
-    "as-printed": Kind("film", 10.0, 12, refraction=False),
+    "film-archive": Kind("film", 10.0, 12, refraction=True, sigma_mm=0.01),
+    "film-mapping": Kind("film", 5.0, 12, refraction=True, sigma_mm=0.005),
+    "digital-frame": Kind("digital", 1.8, 12, refraction=True, sigma_mm=0.003),
+    "uav-corridor": Kind("digital", 3.0, 60, refraction=False, sigma_mm=0.005),
+    "teaching": Kind("film", 10.0, 12, refraction=False, sigma_mm=0.01),
+    "as-printed": Kind("film", 10.0, 12, refraction=False, sigma_mm=0.01),
 }
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a preset made of one strip: gross errors, found ones, good points lost, sigma0, rms of check points."""
-
-    wrong: int
-    found: int
-    lost: int
-    sigma0: float
-    check_um: float
+OWN = ("  unit:", "  y_axis:", "  origin:", "  sigma: 0")  # of the observations: the preset says them
 
 
-def outcome(preset: str, seed: int) -> Outcome:
-    """Simulate a strip, run it with a preset and compare what was rejected with what is wrong."""
+def bare(project: str, preset: str) -> str:
+    """Give a project file that takes from the preset what the preset says."""
+    lines, inside, kept = project.splitlines(), "", []
+    for line in lines:
+        if not line.startswith(" "):
+            inside = line.partition(":")[0]
+        if inside != "processing" and not (inside == "observations" and line.startswith(OWN)):
+            kept.append(line)
+    return "\n".join([*kept, f"extends: {CONFIGS / preset}.yaml"]) + "\n"
+
+
+def completed_by(folder: Path, preset: str, files: dict[str, str]) -> Sample:
+    """Write a project that takes everything else from a preset."""
+    project = sample(folder, files)
+    project.change("project.yaml", "    format: [230, 230]\n", "    format: [230, 230]\n    pixel_size: 0.01\n")
+    project.write("project.yaml", bare((folder / "project.yaml").read_text(encoding="utf-8"), preset))
+    return project
+
+
+def test_every_preset_is_tried() -> None:
+    assert sorted(KINDS) == sorted(path.stem for path in CONFIGS.glob("*.yaml"))
+
+
+@pytest.mark.parametrize("preset", KINDS)
+def test_a_preset_completes_a_project(tmp_path: Path, preset: str) -> None:
+    loaded = completed_by(tmp_path, preset, FILES).load()
+    assert loaded.hints == ()
+    assert loaded.inputs.observations.sigma[0, 0] == pytest.approx(KINDS[preset].sigma_mm, rel=1e-12)
+    left, right = loaded.inputs.observations.xy[[0, 2], 0]
+    assert left - right == pytest.approx(91.0 if KINDS[preset].camera == "film" else 0.91)
+
+
+@pytest.mark.parametrize("preset", ["film-archive", "film-mapping"])
+def test_film_presets_take_fiducial_marks(tmp_path: Path, preset: str) -> None:
+    assert completed_by(tmp_path, preset, MARKED_FILES).load().inputs.fiducials is not None
+
+
+def test_a_standard_deviation_never_takes_its_unit_from_another_file(tmp_path: Path) -> None:
+    preset = CONFIGS / "film-mapping.yaml"
+    project = completed_by(tmp_path, preset.stem, FILES)
+    project.change("project.yaml", "  file: observations.csv", "  file: observations.csv\n  unit: px\n  y_axis: down")
+    message = f"sigma stands in {preset}, its unit in project.yaml; write both in one file"
+    assert project.lines() == [f"{preset}:9:10: observations.sigma: {message}"]
+    assert project.load(["observations.sigma=0.3"]).inputs.observations.sigma[0, 0] == pytest.approx(0.003)
+
+
+def test_a_unit_on_the_command_line_needs_its_standard_deviation_there(project: Sample) -> None:
+    assert len(project.lines(["observations.unit=um"])) == 1
+    assert project.lines(["observations.unit=um", "observations.sigma=5"]) == []
+
+
+GROSS = 40  # standard deviations
+
+
+def outcome(preset: str, seed: int) -> tuple[int, int, int, float, float]:
+    """Simulate a strip, run it with a preset and compare what was rejected with what is wrong.
+
+    Gives gross errors, those of them found, good points lost, sigma0 and rms of check points in standard deviations.
+    """
     kind = KINDS[preset]
     film = kind.camera == "film"
     spec = simulation.Spec(
@@ -281,7 +244,7 @@ def outcome(preset: str, seed: int) -> Outcome:
     rejected = {row["point"] for row in result["rejected"] if not row.get("readmitted", False)}
     # a point that is wrong on two photos by the same amount is wrong without a contradiction
     check = [row["plan_um"] for row in result["control"] if row["role"] == "check" and row["id"] not in wrong]
-    return Outcome(
+    return (
         len(wrong),
         len(wrong & rejected),
         len(rejected - wrong),
@@ -290,29 +253,14 @@ def outcome(preset: str, seed: int) -> Outcome:
     )
 
 
-def bare(project: str, preset: str) -> str:
-    """Give a project file that takes from the preset what the preset says."""
-    lines, inside, kept = project.splitlines(), "", []
-    for line in lines:
-        if not line.startswith(" "):
-            inside = line.partition(":")[0]
-        if inside != "processing" and not (inside == "observations" and line.startswith(OWN)):
-            kept.append(line)
-    return "\n".join([*kept, f"extends: {CONFIGS / preset}.yaml"]) + "\n"
-
-
-def test_every_preset_is_tried() -> None:
-    assert sorted(KINDS) == sorted(path.stem for path in (ROOT / "configs").glob("*.yaml"))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", KINDS)
 def test_a_preset_does_what_it_is_made_for(preset: str) -> None:
-    found = outcome(preset, 1)
-    assert found.found == found.wrong > 0
+    wrong, found, lost, sigma0, check = outcome(preset, 1)
+    assert found == wrong > 0
     # the tests of the textbook lose good points: docs/presets.md
-    assert found.lost <= (3 if preset == "teaching" else 0)
+    assert lost <= (3 if preset == "teaching" else 0)
     # some 60 redundant points: sigma0 is known to 10 %; it is that of the y parallaxes, which film does not enlarge
-    assert 0.6 < found.sigma0 < 1.3
+    assert 0.6 < sigma0 < 1.3
     # 4 bands over 8 photos, degree decided or 2: 1.4 to 2.4 sigma in each coordinate of plan (tables of accuracy)
-    assert 0.7 < found.check_um < 6.0
+    assert 0.7 < check < 6.0

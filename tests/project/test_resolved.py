@@ -1,17 +1,12 @@
 """The resolved project: nothing left unsaid, the same project, the same text everywhere."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from tests.project.samples import MARKED_FILES, Sample, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from tests.project.samples import FILES, MARKED_FILES, Sample, sample
 
 EXPECTED = """\
 # A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.
@@ -110,51 +105,36 @@ VARIANTS: dict[str, list[tuple[str, str]]] = {
     ],
     "orthometric": [("height: ellipsoidal", "height: orthometric\n    geoid_undulation: 44")],
     "output": [("output:", "output:\n  crs: EPSG:4326\n  axes: [north, east, up]")],
+    "marks": [],
+    "marks of their own": [("{file: fiducials.csv}", "{file: fiducials.csv, unit: um, sigma: 3, y_axis: down}")],
     "no tolerances": [("tolerances: {check_rms_xy: 0.40}", "tolerances: {}")],
 }
-
-
-def same(first: Sample, second: Sample) -> None:
-    one, two = first.load(), second.load()
-    assert one.settings == two.settings
-    assert (one.inputs.name, one.inputs.strips, one.inputs.frames) == (
-        two.inputs.name,
-        two.inputs.strips,
-        two.inputs.frames,
-    )
-    assert one.inputs.output == two.inputs.output
-    for table in ("observations", "fiducials"):
-        a, b = getattr(one.inputs, table), getattr(two.inputs, table)
-        if a is not None:
-            np.testing.assert_array_equal(a.xy, b.xy)
-            np.testing.assert_array_equal(a.sigma, b.sigma)
-    np.testing.assert_array_equal(one.inputs.control.enu, two.inputs.control.enu)
-    assert one.resolved == two.resolved
 
 
 def test_the_text(tmp_path: Path) -> None:
     assert sample(tmp_path).load().resolved == EXPECTED
 
 
-@pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
-def test_it_is_the_same_project(tmp_path: Path, changes: list[tuple[str, str]]) -> None:
-    first, second = sample(tmp_path / "a"), sample(tmp_path / "b")
-    for old, new in changes:
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_it_is_the_same_project(tmp_path: Path, variant: str) -> None:
+    files = MARKED_FILES if variant.startswith("marks") else FILES
+    first, second = sample(tmp_path / "a", files), sample(tmp_path / "b", files)
+    for old, new in VARIANTS[variant]:
         first.change("project.yaml", old, new)
     second.write("project.yaml", first.load().resolved)
-    same(first, second)
+    one, two = first.load(), second.load()
+    assert (one.settings, one.resolved) == (two.settings, two.resolved)
+    for name in ("name", "strips", "frames", "output"):
+        assert getattr(one.inputs, name) == getattr(two.inputs, name)
+    np.testing.assert_array_equal(one.inputs.control.enu, two.inputs.control.enu)
+    for table in ("observations", "fiducials"):
+        a, b = getattr(one.inputs, table), getattr(two.inputs, table)
+        if a is not None:
+            np.testing.assert_array_equal(a.xy, b.xy)
+            np.testing.assert_array_equal(a.sigma, b.sigma)
 
 
-@pytest.mark.parametrize("unit", ["{file: fiducials.csv}", "{file: fiducials.csv, unit: um, sigma: 3, y_axis: down}"])
-def test_with_fiducial_marks(tmp_path: Path, unit: str) -> None:
-    first, second = sample(tmp_path / "a", MARKED_FILES), sample(tmp_path / "b", MARKED_FILES)
-    first.change("project.yaml", "{file: fiducials.csv}", unit)
-    second.write("project.yaml", first.load().resolved)
-    same(first, second)
-
-
-def test_presets_and_overrides_are_in_it(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_presets_and_overrides_are_in_it(project: Sample) -> None:
     project.write("preset.yaml", "processing: {refraction: true}\n")
     project.change("project.yaml", "name: sample", "extends: preset.yaml")
     resolved = project.load(["processing.relative.grubbs_alpha=1e-7"]).resolved
@@ -175,9 +155,10 @@ def test_it_does_not_depend_on_the_place(tmp_path: Path, monkeypatch: pytest.Mon
     assert texts == {EXPECTED}
 
 
-def test_other_programs_read_the_same_from_it(tmp_path: Path) -> None:
-    project = sample(tmp_path)
-    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("RC30", "0123").replace("id: B", "id: NO")
+def test_other_programs_read_the_same_from_it(project: Sample) -> None:
+    text = (
+        (project.folder / "project.yaml").read_text(encoding="utf-8").replace("RC30", "0123").replace("id: B", "id: NO")
+    )
     project.write("project.yaml", text)
     read = yaml.safe_load(project.load().resolved)
     assert list(read["cameras"]) == ["0123"]
@@ -187,12 +168,11 @@ def test_other_programs_read_the_same_from_it(tmp_path: Path) -> None:
     assert read["processing"]["refraction"] is False
 
 
-def test_long_lists_of_photos_are_broken_into_lines(tmp_path: Path) -> None:
-    project = sample(tmp_path)
+def test_long_lists_of_photos_are_broken_into_lines(project: Sample) -> None:
     names = [f"photo-{number:04d}" for number in range(200)]
     rows = "".join(f"{name},P,1,2\n" for name in names)
     project.change("project.yaml", "[1001, 1002]", f"[{', '.join(names)}]")
-    text = (tmp_path / "observations.csv").read_text(encoding="utf-8")
+    text = (project.folder / "observations.csv").read_text(encoding="utf-8")
     project.write("observations.csv", text + rows)
     resolved = project.load().resolved
     assert max(map(len, resolved.splitlines())) <= 110

@@ -1,10 +1,8 @@
 """Terrestrial projects: what they mean, and every way in which they can be wrong, with its place."""
 
 # ruff: noqa: E501 (a message stands on one line, as the user reads it)
-from __future__ import annotations
-
 import zipfile
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +11,10 @@ from photostrip.errors import InputError
 from photostrip.project.reading import read_keys
 from photostrip.project.terrestrial import CamerasFile, known_presets, load_survey
 from photostrip.terrestrial.monitoring import monitor
+from photostrip.terrestrial.normal_case import Phototheodolite
 from tests.loops import nonempty
 from tests.terrestrial.simulated import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from photostrip.terrestrial.normal_case import Phototheodolite
 
 
 def read_presets(file: str) -> dict[str, Phototheodolite]:
@@ -28,6 +22,9 @@ def read_presets(file: str) -> dict[str, Phototheodolite]:
     known = known_presets(reading)
     reading.findings.stop()
     return known
+
+
+EPOCHS = "epochs: [{id: epoch 0, time: 0}, {id: epoch 1, time: 1}, {id: epoch 2, time: 2}]\n"
 
 
 def faults(path: Path, *overrides: str) -> list[str]:
@@ -38,13 +35,15 @@ def faults(path: Path, *overrides: str) -> list[str]:
     return [str(fault).replace(f"{path.parent}/", "") for fault in caught.value.faults]
 
 
+def tells(path: Path, expected: str) -> None:
+    told = faults(path)
+    assert any(each.startswith(expected) for each in told), told
+
+
 def replaced(old: str, new: str) -> str:
     text = project()
     assert text.count(old) >= 1, old
     return text.replace(old, new, 1)
-
-
-# --------------------------------------------------------------------------------------------------------- meaning
 
 
 def test_a_project_says_what_was_simulated(tmp_path: Path) -> None:
@@ -117,11 +116,10 @@ def test_standard_deviations_of_rows_count_before_that_of_the_project(tmp_path: 
 
 
 def test_epochs_may_be_left_out_or_named_in_another_order(tmp_path: Path) -> None:
-    epochs = "epochs: [{id: epoch 0, time: 0}, {id: epoch 1, time: 1}, {id: epoch 2, time: 2}]\n"
-    survey = load_survey(write(tmp_path, replaced(epochs, "")))
+    survey = load_survey(write(tmp_path, replaced(EPOCHS, "")))
     assert survey.series.epochs == ("epoch 0", "epoch 1", "epoch 2")
     assert survey.series.times is None
-    survey = load_survey(write(tmp_path, replaced(epochs, "epochs: [epoch 2, epoch 0]\n")))
+    survey = load_survey(write(tmp_path, replaced(EPOCHS, "epochs: [epoch 2, epoch 0]\n")))
     assert survey.series.epochs == ("epoch 2", "epoch 0")
     (note,) = survey.notes
     assert "24 rows of epochs that the project does not name: epoch 1" in note.message
@@ -166,9 +164,6 @@ def test_reference_coordinates_may_stand_once(tmp_path: Path) -> None:
     table = "point,epoch,x,z,p,dx,dz,dx_right\n1,b,30,-12,80,0.35,-0.2,0.1\n1,c,,,,0.4,-0.3,0.1\n"
     survey = load_survey(write(tmp_path, NORMAL, table, "pseudo.csv"))
     np.testing.assert_allclose(survey.series.coordinates[:, 0, 0], [30.0, 30.35, 30.4])
-
-
-# --------------------------------------------------------------------------------------------------------- presets
 
 
 def test_the_cameras_of_the_source_are_there() -> None:
@@ -230,9 +225,6 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
         assert part in told
 
 
-# ---------------------------------------------------------------------------------------------------------- faults
-
-
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
@@ -260,8 +252,7 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
     ],
 )  # fmt: skip
 def test_every_wrong_value_is_told_with_its_place(tmp_path: Path, old: str, new: str, expected: str) -> None:
-    told = faults(write(tmp_path, replaced(old, new)))
-    assert any(each.startswith(expected) for each in told), told
+    tells(write(tmp_path, replaced(old, new)), expected)
 
 
 TABLE = coordinates().splitlines()
@@ -284,8 +275,7 @@ def table(line: int, text: str) -> str:
     ],
 )  # fmt: skip
 def test_every_wrong_row_is_told_with_its_place(tmp_path: Path, content: str, expected: str) -> None:
-    told = faults(write(tmp_path, table=content))
-    assert any(each.startswith(expected) for each in told), told
+    tells(write(tmp_path, table=content), expected)
 
 
 @pytest.mark.parametrize(
@@ -305,8 +295,7 @@ def test_every_wrong_row_is_told_with_its_place(tmp_path: Path, content: str, ex
     ],
 )  # fmt: skip
 def test_every_fault_of_the_normal_case_is_told(tmp_path: Path, text: str, content: str, expected: str) -> None:
-    told = faults(write(tmp_path, text, content, "pseudo.csv"))
-    assert any(each.startswith(expected) for each in told), told
+    tells(write(tmp_path, text, content, "pseudo.csv"), expected)
 
 
 def test_faults_of_the_project_and_of_its_table_are_told_together(tmp_path: Path) -> None:
@@ -315,8 +304,7 @@ def test_faults_of_the_project_and_of_its_table_are_told_together(tmp_path: Path
 
 
 def test_one_epoch_in_the_table_is_too_few(tmp_path: Path) -> None:
-    epochs = "epochs: [{id: epoch 0, time: 0}, {id: epoch 1, time: 1}, {id: epoch 2, time: 2}]\n"
-    told = faults(write(tmp_path, replaced(epochs, ""), "\n".join(TABLE[:25]) + "\n"))
+    told = faults(write(tmp_path, replaced(EPOCHS, ""), "\n".join(TABLE[:25]) + "\n"))
     assert told == [
         "survey.yaml:10:29: measurements.coordinates: coordinates.csv has only one epoch, epoch 0; expected two or more"
     ]

@@ -1,8 +1,7 @@
 """Keys that do nothing as the others stand are told with what would make them count, and do nothing indeed."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,9 +12,6 @@ from photostrip.project.resolved import OF_MODELS, OF_PHOTOS
 from tests.loops import nonempty
 from tests.results import spec, write_project
 from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 CODE = "without-effect"
 # a key with a value that is not its default, and other keys that make it count, by what the program says of it

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from photostrip.cli.main import main
 from photostrip.report.html import batch_html, to_html
 from photostrip.report.page.parts import Facts, Table, Words
 from photostrip.report.pictures.commands import batch_maps
@@ -22,13 +21,12 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import by_rows, case, in_tables, solved, spec, write_project
+from tests.results import by_rows, case, in_tables, solved, spec
 from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     Document = dict[str, Any]
 
@@ -106,21 +104,15 @@ def test_nothing_is_loaded_from_elsewhere() -> None:
             assert "//" not in value or (tag, name) == ("svg", "xmlns")
     assert "url(" not in CSS
     assert "@import" not in CSS
-
-
-def test_the_reader_needs_no_other_file() -> None:
     assert [words for words in page().words if re.search(r"result\.json|--\w|\.csv", words)] == []
 
 
-def test_ids_are_there_once_and_links_lead_to_them() -> None:
+def test_ids_are_there_once_links_lead_to_them_and_there_are_words_for_readers_that_do_not_see() -> None:
     ids = [attributes["id"] for _, attributes in page().elements if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert [link["href"] for link in page().of("a") if link["href"].removeprefix("#") not in ids] == []
     for attributes in nonempty((each for _, each in page().elements if "aria-labelledby" in each)):
         assert set(attributes["aria-labelledby"].split()) <= set(ids)
-
-
-def test_readers_that_do_not_see_have_words_for_everything() -> None:
     found = page()
     assert found.of("html") == [{"lang": "en"}]
     assert len(found.of("h1")) == len(found.of("main")) == 1
@@ -169,9 +161,6 @@ def test_ids_cannot_become_elements() -> None:
     assert name in " ".join(Page(text).words)
 
 
-# ----------------------------------------------------------------------------------------------------- commands
-
-
 def test_findings_lead_to_rows_and_pictures_and_back() -> None:
     document = by_rows(saved())
     point, pair = document["control"][0]["id"], document["models"][0]
@@ -211,11 +200,6 @@ def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
         assert f">{name} in Control points<" in item
         assert re.search(rf'<tr id="[^"]+"><th[^>]*>{name} <a class="back" href="#finding-{number}"', text)
     assert f"point {noted}: control-doubtful" in text
-
-
-def test_html_needs_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", str(write_project(tmp_path, spec())), "--html"]) == 2
-    assert "--output" in capsys.readouterr().err
 
 
 MOST = 3000  # bytes for each photo
@@ -276,17 +260,13 @@ OUTCOMES = [
 ]
 
 
-def test_every_project_leads_to_its_report_and_a_faulty_one_to_none() -> None:
+def test_every_project_leads_to_its_report_a_faulty_one_to_none_and_the_worst_comes_first() -> None:
     page = batch_html(OUTCOMES, "1")
     assert re.findall(r'<a href="([^"#]+)"', page) == [
         "a/report.html", "b%20%26%20c/report.html", "moon/report.html", "local/report.html"
     ]  # fmt: skip
     assert all(f"strips/{name}/project.yaml" in page for name in ("a", "moon", "local", "bad"))
     assert page == batch_html(OUTCOMES, "1")
-
-
-def test_the_worst_comes_first() -> None:
-    page = batch_html(OUTCOMES, "1")
     texts = ("1 faulty, 1 look, 3 good", "What is wrong</h2>", ":3: is wrong", "photo 7 is odd")
     order = [page.index(text) for text in texts]
     assert order == sorted(order)

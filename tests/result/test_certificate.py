@@ -53,9 +53,9 @@ def test_what_a_report_shows_of_places_is_covered(path: str, step: float | str) 
     assert hash_of(changed(path, step)) != hash_of(plain())
 
 
-@pytest.mark.parametrize("path", ["version", "verdict.accuracy", "name", "statement.sentences"])
-def test_words_and_versions_are_left_out(path: str) -> None:
-    assert hash_of(changed(path, "other")) == hash_of(plain())
+def test_words_and_versions_are_left_out() -> None:
+    for path in ("version", "verdict.accuracy", "name", "statement.sentences"):
+        assert hash_of(changed(path, "other")) == hash_of(plain()), path
 
 
 def test_versions_are_those_that_are_installed() -> None:

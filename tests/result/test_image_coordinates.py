@@ -78,13 +78,10 @@ def test_refined_csv_has_every_image_point_after_every_correction() -> None:
         assert abs(float(row["sigma_x_um"]) - 5.0) < 0.01
 
 
-def test_refined_csv_is_written_of_photos_only() -> None:
+def test_refined_csv_is_written_of_photos_only_and_quotes_ids() -> None:
     assert "refined.csv" in Result(film().document, computed=film().result).files()
     models = solved(inputs_of(simulate(replace(spec(), models=Models()))))
     assert "refined.csv" not in Result(models.document, computed=models.result).files()
-
-
-def test_ids_are_quoted_in_refined_csv() -> None:
     inputs = case("local").inputs
     o = inputs.observations
     named = replace(o, photo_ids=tuple(f"{name},%s" for name in o.photo_ids))

@@ -87,9 +87,6 @@ def test_angle_rates_are_the_derivatives_of_the_rotation(system: str) -> None:
         skew = (plus - minus) @ from_angles(values, system).T / (2 * step)
         assert rates[:, number] == pytest.approx([skew[2, 1], skew[0, 2], skew[1, 0]], abs=1e-8)
     assert angle_rates(np.tile(values, (4, 1)), system)[2] == pytest.approx(rates)
-
-
-def test_an_unknown_system_of_angles_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown system"):
         angle_rates([0.0, 0.0, 0.0], "roll-pitch-yaw")
 

@@ -1,4 +1,4 @@
-"""Measuring: noise, film and fiducial marks, positions of the cameras."""
+"""What is measured: noise, film, marks, positions of the cameras, control, and gross errors where the truth says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Interior orientation: a published example, known film deformations, and every way to mix up marks."""
+"""Interior orientation: published and known deformations, every way to mix up marks; marks from distances; film."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gross errors of pairs: printed logs of rejections, a published experiment with its shares, what may not go."""
+"""Gross errors of pairs: printed logs, the search for sets against direct solutions, known errors, robust weights."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from photostrip.strip.relative_orientation import (
 )
 from photostrip.strip.robust import MEDIAN_SPREAD, falling_weights, medians, scales
 from tests.loops import nonempty
-from tests.strips import MICROMETRE, TruePairs, batch, measured, true_pairs
+from tests.strips import MICROMETRE, TruePairs, measured, true_pairs
 from tests.vectors import Vector, cases
 
 Log = tuple[Rejection, ...]
@@ -39,20 +39,6 @@ def screened(orientation: Orientation, settings: RelativeSettings, sigma: float)
     """Reject points and give the pairs without them, and the log."""
     found = pair_screening.screen_pairs(orientation, settings, sigma)
     return found.orientation, found.rejections
-
-
-def clean(seed: int = 0, pairs: int = 1, points: tuple[int, ...] = ZONES, sigma: float = SIGMA) -> TruePairs:
-    return true_pairs(np.random.default_rng(seed), pairs, counts=points, tilt_deg=3.0, kappa_deg=0.0, sigma=sigma)
-
-
-def spoiled(truth: TruePairs, errors: dict[int, float]) -> Orientation:
-    """Orient pairs after adding errors in mm to the left y of some rows."""
-    left = truth.pairs.left.copy()
-    for row, error in errors.items():
-        left[row, 1] += error
-    shape = (truth.pairs.size, -1, 2)
-    pairs = batch(left.reshape(shape), truth.pairs.right.reshape(shape), truth.pairs.focal)
-    return TruePairs(pairs, truth.base, truth.rotation).orient()
 
 
 def of_example(example: Vector) -> tuple[Orientation, list[str]]:
@@ -102,7 +88,7 @@ def test_screening_as_a_project_asks_for_it(example: Vector) -> None:
 
 
 def test_the_automatic_limit_is_four_sigma_of_a_parallax() -> None:
-    oriented = spoiled(clean(3), {5: 0.4})
+    oriented = spoiled(level(3, 1), {5: 0.4})
     _, log = screened(oriented, RelativeSettings("parallax+grubbs"), SIGMA)
     assert log[0].test == "parallax"
     assert log[0].limit == pytest.approx(4 * np.sqrt(2) * SIGMA)
@@ -115,12 +101,12 @@ def test_the_automatic_limit_is_four_sigma_of_a_parallax() -> None:
 
 @pytest.mark.parametrize("method", ["parallax+grubbs", "tau"])
 def test_a_pair_keeps_six_points(method: str) -> None:
-    truth = clean(10, points=(2, 1, 2, 1, 1, 1))
+    truth = level(10, 1, (2, 1, 2, 1, 1, 1))
     errors = {row: 3.0 * (-1) ** row for row in range(0, 8, 2)}
     found, log = screened(spoiled(truth, errors), RelativeSettings(method, 0.2, 0.001), SIGMA)
     assert found.points_used[0] >= 6
     assert len(log) <= 2
-    six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
+    six = spoiled(level(10, 1, (1,) * 6), {0: 3.0})
     found, log = screened(six, RelativeSettings(method, 0.2, 0.001), SIGMA)
     assert log == ()
 
@@ -130,6 +116,13 @@ def with_errors(flown: TruePairs, errors: Floats) -> Pairs:
     left = flown.pairs.left.copy()
     left[:, 1] += errors.ravel()
     return replace(flown.pairs, left=left)
+
+
+def spoiled(flown: TruePairs, errors: dict[int, float]) -> Orientation:
+    """Orient pairs after adding errors in mm to the left y of some rows."""
+    every = np.zeros(len(flown.pairs.left))
+    every[list(errors)] = list(errors.values())
+    return orient_unchecked(with_errors(flown, every))[0]
 
 
 def examined(

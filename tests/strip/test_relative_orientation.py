@@ -1,4 +1,4 @@
-"""Relative orientation: printed examples, other routes to the same elements, starts from anywhere, refusals by name."""
+"""Relative orientation: printed examples, other routes to the elements, refusals; zones, six points, weak pairs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Space resection: the truth from poor starts, residuals as large as the noise, photos that cannot be oriented."""
+"""Resection and intersection: the truth from poor starts and from none, noise, what cannot be oriented."""
 
 from __future__ import annotations
 

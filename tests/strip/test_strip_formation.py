@@ -1,4 +1,4 @@
-"""Forming a strip: printed examples, strips that come back to the truth, wrong and missing pass points."""
+"""Forming a strip: printed examples, the way back to the truth, wrong and missing pass points, two rays."""
 
 from __future__ import annotations
 

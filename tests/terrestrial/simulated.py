@@ -1,4 +1,4 @@
-"""Simulated terrestrial surveys: two convergent cameras, points that move, cameras that turn, noise of known size."""
+"""Simulated terrestrial surveys, in memory and as projects on disk: points that move, cameras that turn."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats
 from photostrip.simulation.draws import Draws, Purpose
@@ -19,13 +20,8 @@ SIGMA = 0.005  # mm
 
 
 def about(axis: int, angle: float) -> Floats:
-    """Give the matrix of a rotation about one axis, right-hand rule: written apart from the program."""
-    c, s = np.cos(angle), np.sin(angle)
-    first, second = [(1, 2), (2, 0), (0, 1)][axis]
-    matrix = np.eye(3)
-    matrix[first, first] = matrix[second, second] = c
-    matrix[second, first], matrix[first, second] = s, -s
-    return matrix
+    """Give the matrix of a rotation about one axis, right-hand rule, by a library that is not ours."""
+    return np.asarray(Rotation.from_rotvec(angle * np.eye(3)[axis]).as_matrix(), float)
 
 
 def attitude(alpha: float, omega: float, kappa: float) -> Floats:
@@ -120,7 +116,9 @@ def repeated(truth: World, runs: int) -> dict[str, Floats]:
     """Measure a survey many times: last displacements of the points that are not stable, and what is called moved.
 
     ``errors`` in standard deviations; ``plan`` and ``space`` squared, weighted by the inverse covariance; ``false`` and
-    ``stable false``: points that stand still and are called moved; ``cameras``: the last left camera is called turned.
+    ``stable false``: points that stand still and are called moved; ``cameras``: the last left camera is called turned;
+    ``squares``: sigma0 of the turns, squared; ``parallax`` and ``change``: vertical parallaxes and their changes, in
+    standard deviations.
     """
     found: dict[str, list[Floats]] = {}
     still = ~truth.velocity.any(axis=1)
@@ -135,6 +133,9 @@ def repeated(truth: World, runs: int) -> dict[str, Floats]:
             "false": moved[ordinary & still],
             "stable false": moved[~ordinary & still],
             "cameras": np.array([result.cameras[-2].moved]),
+            "squares": np.array([each.turn.weighted_sum / each.turn.dof for each in result.cameras if each.turn]),
+            "parallax": (result.parallax[-1] / result.parallax_sigma[-1])[ordinary],
+            "change": (result.parallax_change[-1] / result.parallax_change_sigma[-1])[ordinary],
         }.items():
             found.setdefault(name, []).append(values)
     return {name: np.concatenate(values) for name, values in found.items()}

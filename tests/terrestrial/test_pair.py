@@ -1,4 +1,4 @@
-"""Convergent photos brought to the normal case: collinearity, an independent intersection, differences."""
+"""A pair: brought to the normal case, intersected, displaced, and what a plan expects of it."""
 
 from __future__ import annotations
 

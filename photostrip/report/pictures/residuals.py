@@ -1,4 +1,4 @@
-"""Image residuals: vectors in the photos, their mean over the image plane of each camera, their distribution."""
+"""Image residuals: in the photos, over the image plane of each camera, their distribution; the distortion of lenses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.pictures.chart import (
     Areas,
     Bar,
@@ -34,6 +34,8 @@ CELLS = 8  # of the grid along the longer side of the image plane
 LEAST_IN_CELL = 3  # residuals from which a cell has a mean
 SHARE_ON_SCALE = 0.95  # share of the vectors that are not longer than a length of the scale
 CAMERAS = 4  # whose image planes are drawn
+RADIAL = {"k1": 3, "k2": 5, "k3": 7}  # parameters of a lens, and the powers of the radius that they count
+CURVE = 60  # points of a curve
 BARS = 33  # of a histogram, an odd number
 LEAST_REACH = 4.5  # standard deviations that a histogram holds, at least
 
@@ -151,6 +153,55 @@ def _cells(at: Floats, v: Floats, size: float) -> Floats:
     count = np.bincount(cell)
     means = np.column_stack([np.bincount(cell, column) / count for column in columns.T])
     return np.column_stack([means, count])[count >= LEAST_IN_CELL]
+
+
+def distortion_pictures(document: Document) -> list[Picture]:
+    """Draw the radial distortion of each lens, image to ideal: as given, and as the self-calibration has it."""
+    panels = []
+    cameras = [each for each in document["cameras"] if each["format_mm"]]
+    for camera in cameras:
+        radius = np.linspace(0.0, float(np.hypot(*camera["format_mm"])) / 2.0, CURVE)
+        given, layers = _given_distortion(camera, radius), list[Layer]()
+        found = [row for row in _calibrated(document) if row["camera"] == camera["id"] and row["parameter"] in RADIAL]
+        if given is not None:
+            layers.append(Line(np.column_stack([radius, given]), "c1 dashed", "given"))
+        if found:
+            powers = np.column_stack([1000.0 * radius ** RADIAL[row["parameter"]] for row in found])
+            adjusted = (0.0 if given is None else given) + powers @ [row["value"] for row in found]
+            every = [row["parameter"] for row in _calibrated(document) if row["camera"] == camera["id"]]
+            at = [every.index(row["parameter"]) for row in found]
+            sigma = np.array([row["sigma"] for row in found])
+            covariance = np.outer(sigma, sigma) * [[row["correlations"][n] for n in at] for row in found]
+            spread = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", powers, covariance, powers), 0.0))
+            layers.append(Line(np.column_stack([radius, adjusted]), "c2", "adjusted"))
+            layers += [
+                Line(np.column_stack([radius, adjusted + side * spread]), "c2 thin dotted", words)
+                for side, words in ((1.0, "its standard deviation"), (-1.0, ""))
+            ]
+        if layers:
+            panels.append(
+                Panel(layers, camera["id"] if len(cameras) > 1 else "", ("mm from the principal point", "µm"))
+            )
+    if not panels:
+        return []
+    caption = "Radial distortion, what is added to an image point away from the principal point to make it ideal."
+    words = "Radial distortion of the lens", caption, f"{counted(len(panels), 'lens', 'lenses')}."
+    return [chart("distortion", words, panels[:CAMERAS], columns=min(len(panels), 2), height=180.0)]
+
+
+def _calibrated(document: Document) -> Sequence[Document]:
+    return list((document.get("bundle") or {}).get("calibration") or ())
+
+
+def _given_distortion(camera: Document, radius: Floats) -> Floats | None:
+    """Return the distortion, µm, of a lens as it is given; of one that is added to ideal points to first order."""
+    sign = 1000.0 if camera["lens_direction"] == "image_to_ideal" else -1000.0
+    if camera["lens_radius"]:
+        return np.asarray(sign * np.interp(radius, camera["lens_radius"], camera["lens_distortion"]), float)
+    if not any(camera["lens_k"] or ()):
+        return None
+    powers = zip(camera["lens_k"], RADIAL.values(), strict=False)
+    return np.asarray(sign * sum(k * radius**power for k, power in powers), float)
 
 
 def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:

@@ -6,7 +6,7 @@ from photostrip.notes import Document
 from photostrip.report.pictures.along import check_pictures, deformation_pictures, parallax_pictures, precision_pictures
 from photostrip.report.pictures.places import plan_of
 from photostrip.report.pictures.plan import footprint_pictures, plan_picture, precision_maps, tie_pictures
-from photostrip.report.pictures.residuals import residual_pictures
+from photostrip.report.pictures.residuals import distortion_pictures, residual_pictures
 from photostrip.report.pictures.svg import Picture
 
 SECTIONS = {
@@ -19,6 +19,7 @@ SECTIONS = {
     "residuals": "images",
     "image-plane": "images",
     "histogram": "images",
+    "distortion": "images",
 }
 """Sections of the report to which pictures belong, as ``--section`` names them; the others are of the ground."""
 
@@ -35,6 +36,7 @@ def pictures_of(document: Document) -> list[Picture]:
         *deformation_pictures(plan),
         *check_pictures(document),
         *residual_pictures(plan),
+        *distortion_pictures(document),
     ]
 
 

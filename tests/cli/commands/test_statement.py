@@ -12,7 +12,7 @@ from photostrip.cli.main import main
 from photostrip.formats.result_json import to_json
 from tests.calls import words
 from tests.loops import nonempty
-from tests.result.test_evidence import GOOD, block, certified
+from tests.result.test_statement import GOOD, block, certified
 from tests.results import case
 
 if TYPE_CHECKING:

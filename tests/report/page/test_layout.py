@@ -1,4 +1,4 @@
-"""Pages of any width and the terminal: nothing wider, nothing lost, the same words; colours where they are wanted."""
+"""Pages of any width, the terminal and its progress: nothing wider, nothing lost; findings told by examples."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ import os
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from photostrip.errors import Fault
+from photostrip.notes import Note
+from photostrip.plausibility import found
 from photostrip.report.page.layout import (
     NARROWEST,
     WIDEST_PAGE,
@@ -26,7 +30,9 @@ from photostrip.report.page.layout import (
     to_text,
     wrapped,
 )
+from photostrip.report.page.messages import MOST_OF_A_KIND, finding_of, lines_of
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
+from photostrip.report.page.progress import progress
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from tests.reports import saved
 from tests.source_tree import ROOT
@@ -151,12 +157,8 @@ def shown(stream: io.StringIO, width: int | None = 100, *, colour: bool | None =
     return stream.getvalue()
 
 
-def plain(width: int = 100) -> str:
+def plain(width: int) -> str:
     return to_text(title_of(saved()), sections_of(saved()), width)
-
-
-def test_a_pipe_gets_the_plain_text() -> None:
-    assert shown(io.StringIO()) == plain()
 
 
 @pytest.mark.parametrize("width", [60, 100, 200])
@@ -165,7 +167,7 @@ def test_colours_change_nothing_but_colours(width: int, monkeypatch: pytest.Monk
     monkeypatch.setenv("TERM", "xterm-256color")
     text = shown(Terminal(), width)
     assert "\x1b[1;31m" in text
-    assert ESCAPE.sub("", text) == plain(width)
+    assert ESCAPE.sub("", text) == plain(width) == shown(io.StringIO(), width)
 
 
 def test_when_there_are_colours() -> None:
@@ -204,3 +206,104 @@ def test_rich_is_not_loaded_for_a_pipe() -> None:
         "sys.exit('rich' in sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True)
+
+
+SHARED = [found("P301", f"point {number} stands for two points", "", points=(f"{number}",)) for number in range(4427)]
+OUTSIDE = found("P402", "control[0] lies elsewhere", "correct the crs")
+
+
+def test_a_kind_is_told_by_examples_and_a_count() -> None:
+    lines = lines_of([finding_of(each) for each in (*SHARED, OUTSIDE)])
+    assert len(lines) == MOST_OF_A_KIND + 2
+    assert lines[MOST_OF_A_KIND - 1].startswith("warning: P301 point 4 stands")
+    assert lines[MOST_OF_A_KIND] == "warning: P301 4422 more like these; --format json names all"
+    assert lines[-1].startswith("error: P402 ")
+    notes = [finding_of(Note("unused", f"row {number} is not used")) for number in range(9)]
+    assert len(lines_of(notes)) == MOST_OF_A_KIND + 1
+    assert lines_of(notes)[-1] == "warning: unused 4 more like these; --format json names all"
+
+
+def test_faults_are_told_by_column_and_by_the_key_of_a_list() -> None:
+    def told(*faults: Fault) -> list[str]:
+        return lines_of([finding_of(each) for each in faults])
+
+    rows = [Fault("no number", "not-a-number", "o.csv", line, 9, "x") for line in range(1, 201)]
+    more = Fault("and 7 more faults in this file", "more", "o.csv")
+    lines = told(*rows, more)
+    assert lines[:MOST_OF_A_KIND] == [f"error: o.csv:{line}:9: x: no number" for line in range(1, 6)]
+    assert lines[MOST_OF_A_KIND:] == [
+        "error: o.csv: not-a-number 195 more like these; --format json names all",
+        "error: o.csv: and 7 more faults in this file",
+    ]
+    assert len(told(*(Fault("2 points", "few", "p.yaml", key=f"strips[0].photos[{i}]") for i in range(40)))) == 6
+    keys = [Fault("no key", "unknown-key", "p.yaml", key=key) for key in ("a", "b", "c", "d", "e", "f", "g")]
+    assert len(told(*keys)) == len(keys)
+
+
+WIPED = "\x1b[2K"
+
+
+@pytest.fixture(autouse=True)
+def _terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "60")
+
+
+@pytest.mark.parametrize(
+    ("stream", "quiet", "term", "shown"),
+    [(Terminal, False, "xterm", True), (Terminal, True, "xterm", False), (Terminal, False, "dumb", False),
+     (io.StringIO, False, "xterm", False)],
+)  # fmt: skip
+def test_a_terminal_sees_it_and_it_goes_away(
+    monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO], *, quiet: bool, term: str, shown: bool
+) -> None:
+    monkeypatch.setenv("TERM", term)
+    written = stream()
+    with progress(written, 3, quiet=quiet, patience=0.01) as line:
+        line.at("first")
+        line.at("second \x1b]0;title\x07" + "x" * 500)
+        time.sleep(0.3)
+    text = written.getvalue()
+    assert ("2/3" in text and "second \\x1b]0;title" in text and "x" * 60 not in text) is shown
+    assert (WIPED in text[-12:]) is shown
+    assert shown or not text
+
+
+def test_short_work_shows_nothing_and_a_failure_takes_the_line_away() -> None:
+    stream = Terminal()
+    with progress(stream) as line:
+        line.at("short")
+        time.sleep(0.05)
+    assert stream.getvalue() == ""
+
+    def work() -> None:
+        with progress(stream, patience=0.0) as line:
+            line.at("failing")
+            raise ValueError
+
+    with pytest.raises(ValueError):  # noqa: PT011 (its own)
+        work()
+    assert WIPED in stream.getvalue()[-12:]
+
+
+def test_a_terminal_that_is_gone_stops_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = Terminal()
+    with progress(stream, patience=0.0) as line:
+        monkeypatch.setattr(stream, "write", _broken)
+        line.at("going on")
+        time.sleep(0.2)
+
+
+def _broken(_text: str) -> int:
+    raise OSError
+
+
+def test_the_bar_of_a_batch_shows_control_characters_and_sends_none() -> None:
+    stream = Terminal()
+    with progress(stream, 2, patience=0.0) as shown:
+        shown.begun("a\x1b]0;title\x07/project.yaml")
+        time.sleep(0.2)
+        shown.say("b\x1b]0;title\x07: faulty")
+        shown.finished("a\x1b]0;title\x07/project.yaml")
+    assert "\x1b]" not in stream.getvalue()
+    assert stream.getvalue().count("\\x1b]0;title\\x07") >= 2

@@ -68,16 +68,12 @@ def test_a_value_by_unit_a_list_a_flag_and_a_probability() -> None:
     evidence = {"p": [0.0004, 0.25], "accepted": [True, False], "f": [11.111, None]}
     shown = keyed(ResultTable.of("polynomial_evidence", evidence), "f p accepted")
     assert shown.rows == (("11.11", "<0.001", "yes"), (DASH, "0.250", "no"))
-    links = ResultTable.of("links", {"points_rejected": [["a", "b"], []]})
-    assert keyed(links, "points_rejected").rows == (("2",), ("0",))
-
-
-def test_columns_of_any_rows_are_printed_by_their_forms() -> None:
     columns = (Field("photo_id", rank=1), Field("base", "um 2", "b"), Field("n", "count"), Field("x", shown=False))
     table = tabulated(columns, [("1", 0.5, 7, 0), ("2", None, None, 0)], "note")
     assert table.columns == (Column("photo id", left=True, rank=1), Column("b", "µm"), Column("n"))
-    assert table.rows == (("1", "0.50", "7"), ("2", DASH, DASH))
-    assert table.note == "note"
+    assert (table.rows, table.note) == ((("1", "0.50", "7"), ("2", DASH, DASH)), "note")
+    links = ResultTable.of("links", {"points_rejected": [["a", "b"], []]})
+    assert keyed(links, "points_rejected").rows == (("2",), ("0",))
 
 
 def test_a_column_of_points_reaches_the_report_by_its_description_alone() -> None:

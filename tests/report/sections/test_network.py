@@ -101,13 +101,22 @@ def test_beside_an_error_it_is_said_all_the_same(wrong: dict[str, float], cause:
 
 
 @pytest.mark.slow
-def test_what_the_project_asks_for_is_estimated_and_not_taken_up() -> None:
+def test_what_the_project_asks_for_is_estimated_and_not_taken_up_and_the_most_significant_shown() -> None:
+    """Fifty strips with an offset each do not fill the page."""
     document = adjusted(east=10.0, correction="offset")
     assert document["bundle"]["taken_up"] == []
     assert said(document, "taken up") == []
     first, second = said(document, "estimated")
     assert first.startswith("camera positions of strip A: added -9.")
     assert second.startswith("camera positions of strip B: added -")
+    document = by_rows(document)
+    rows = [row for row in document["bundle"]["corrections"] if row["group"] == "strip A"]
+    document["bundle"]["corrections"] = [
+        {**row, "group": f"strip {n}", "whole": float(n % 31)} for n in range(50) for row in rows
+    ]
+    *shown, more = said(document, "estimated")
+    assert [each.split(":")[0] for each in shown] == [f"camera positions of strip {n}" for n in (28, 29, 30)]
+    assert more == "47 more cameras or groups of positions, less significant: --section bundle"
 
 
 @pytest.mark.slow
@@ -119,19 +128,6 @@ def test_a_drift_is_told_by_what_it_is_from_the_first_to_the_last() -> None:
         assert row["whole_sigma"] == pytest.approx(times * row["sigma"], abs=1e-3)
     first, _ = said(document, "estimated")
     assert "; from the first to the last " in first
-
-
-@pytest.mark.slow
-def test_of_many_groups_the_most_significant_are_shown() -> None:
-    """Fifty strips with an offset each do not fill the page."""
-    document = by_rows(adjusted(east=10.0, correction="offset"))
-    rows = [row for row in document["bundle"]["corrections"] if row["group"] == "strip A"]
-    document["bundle"]["corrections"] = [
-        {**row, "group": f"strip {n}", "whole": float(n % 31)} for n in range(50) for row in rows
-    ]
-    *shown, more = said(document, "estimated")
-    assert [each.split(":")[0] for each in shown] == [f"camera positions of strip {n}" for n in (28, 29, 30)]
-    assert more == "47 more cameras or groups of positions, less significant: --section bundle"
 
 
 @pytest.mark.slow

@@ -84,16 +84,12 @@ def test_what_auto_came_to_is_said(frame: str) -> None:
     assert (f"degree {degree}" if degree else "none") in found["polynomial"]
 
 
-def test_what_was_asked_for_is_no_decision() -> None:
+def test_what_was_asked_for_is_no_decision_automatic_limits_and_heights_are() -> None:
     document = by_rows(case("local").document)
     document["polynomials"][0]["asked"] = "2"
     document["settings"]["relative"]["screening"] = "tau"
     document["corrections"]["earth_curvature"]["asked"] = "none"
     assert facts(document) == {}
-
-
-def test_an_automatic_limit_and_automatic_heights_are_said() -> None:
-    document = by_rows(case("local").document)
     document["settings"]["relative"]["screening"] = "parallax+grubbs"
     document["settings"]["refinement"]["refraction"] = True
     document["settings"]["interior"]["transform"] = "auto"
@@ -104,7 +100,7 @@ def test_an_automatic_limit_and_automatic_heights_are_said() -> None:
     assert found["fiducial marks"].startswith("affine and conformal transformation")
 
 
-def test_a_weight_is_that_of_the_fit() -> None:
+def test_a_weight_is_that_of_the_fit_and_coordinates_that_do_not_count_weigh_nothing() -> None:
     """The standard deviation in the fit is that of the given coordinate together with that of a point of a model."""
     document = case("projected").document
     table = weights(document)
@@ -114,9 +110,6 @@ def test_a_weight_is_that_of_the_fit() -> None:
     for row in nonempty(table.rows):
         given, fit = np.array(row[2:5], float), np.array(row[5:8], float)
         assert np.abs(np.hypot(given, point) - fit).max() < 0.0011
-
-
-def test_coordinates_that_do_not_count_weigh_nothing() -> None:
     document = by_rows(case("projected").document)
     row = next(each for each in document["control"] if each["role"] == "control")
     row["use"] = "xy"
@@ -132,25 +125,18 @@ def lines(document: Document, width: int = 100) -> list[str]:
     return to_text(title_of(document), chosen_sections(document, width=width), width).splitlines()
 
 
+PLACE = {"file": "", "line": 0, "column": 0, "key": ""}
+
+
 def crowded() -> Document:
     """Give a result in which there is too much of everything: a block of 60 strips with 1000 pairs."""
     document = by_rows(saved())
     control, check = (next(row for row in document["control"] if row["role"] == role) for role in ("control", "check"))
     strip, pair, polynomial = document["strips"][0], document["models"][0], document["polynomials"][0]
     text = "a sentence of some length that says with ids, numbers and units what is wrong with this one and why " * 3
-    note = {"severity": "note", "message": text, "strip": "", "photos": [], "points": []}
-    note |= {"file": "", "line": 0, "column": 0, "key": ""}
+    note = {"severity": "note", "message": text, "strip": "", "photos": [], "points": []} | PLACE
     finding = {"title": "a mistake", "severity": "error", "accepted": False, "message": text, "fix": text}
-    finding |= {
-        "evidence": {"size_m": 1.0},
-        "points": [],
-        "photos": [],
-        "strips": [],
-        "file": "",
-        "line": 0,
-        "column": 0,
-        "key": "",
-    }
+    finding |= {"evidence": {"size_m": 1.0}, "points": [], "photos": [], "strips": []} | PLACE
     document |= {
         "status": "failed",
         "control": [{**row, "id": f"{n}"} for n in range(300) for row in (control, check)],
@@ -202,12 +188,8 @@ def test_each_stage_has_one_line() -> None:
     (stages,) = (each for each in overview(case().document, 100) if each.title == "Stages")
     (facts,) = stages.parts
     assert isinstance(facts, Facts)
-    assert [label for label, _ in facts.rows][:4] == [
-        "relative orientation",
-        "scale transfer",
-        "absolute orientation",
-        "polynomial",
-    ]
+    labels = ["relative orientation", "scale transfer", "absolute orientation", "polynomial"]
+    assert [label for label, _ in facts.rows][:4] == labels
     printed = to_text("", [stages], 100).splitlines()
     assert len(printed) == 1 + len(facts.rows)
 
@@ -224,7 +206,7 @@ def test_nothing_is_said_twice() -> None:
     """What a warning or a finding says stands in the verdict alone; the plausibility has its cure."""
     document = by_rows(saved())
     warning = {"code": "c", "severity": "warning", "message": "mind this", "strip": "", "photos": [], "points": []}
-    warning |= {"file": "", "line": 0, "column": 0, "key": ""}
+    warning |= PLACE
     finding = {
         "code": "P101", "title": "units", "severity": "warning", "accepted": False, "message": "too large by 1000",
         "fix": "write `um`", "evidence": {}, "points": [], "file": "", "line": 0, "column": 0,
@@ -240,7 +222,7 @@ def test_nothing_is_said_twice() -> None:
 def test_notes_of_a_kind_are_said_once() -> None:
     notes = [
         {"code": "c", "severity": "note", "message": f"strip {name}: so", "strip": name, "photos": [], "points": []}
-        | {"file": "", "line": 0, "column": 0, "key": ""}
+        | PLACE
         for name in "ABC"
     ]
     assert "- strip A: so (and the same for strips B, C)" in lines({**saved(), "notes": notes})
