@@ -108,9 +108,8 @@ def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulat
 
 
 @pytest.mark.slow
-def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
+def test_data_frames_are_tables(project: dict[str, Any]) -> None:
     pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
-    project = in_memory(simulation)
     expected = photostrip.load(project).loaded.inputs.observations
     images = project["observations"].pop("file")
     for table in (pandas.DataFrame(images), pyarrow.table(images)):
