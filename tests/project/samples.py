@@ -129,6 +129,11 @@ class Sample:
         assert len(told) == 1, "\n".join(lines) or "no fault"
         assert lines == told or not alone
 
+    def refuses(self, file: str, old: str, new: str, place: str, *words: str) -> None:
+        """Change one thing, and see what is told of it."""
+        self.change(file, old, new)
+        self.tells(place, *words)
+
 
 def sample(folder: Path, files: dict[str, str] | None = None) -> Sample:
     """Write a project that is right."""

@@ -82,18 +82,19 @@ WRONG = [
     ("{camera: RC30, photos: [1001]}", STRIPS, "project.yaml:16:33: photos.photos[0]:", "already listed, in strip A"),
     ("{camera: RC30, photos: [1003]}", "", "project.yaml:9:33: photos.photos[0]:", "no point on photo 1003", "remove"),
     ("[{camera: RC30}, {camera: RC30}]", "", "project.yaml:9:26: photos[1]:", "second entry", "list its photos"),
-    ("{camera: RC30}", SECOND.replace("B", "1001"), "project.yaml:13:18: photos.camera:", "has the id of a strip"),
+    (
+        "{camera: RC30}",
+        "strips:\n" + SECOND.replace("B", "1001"),
+        "project.yaml:13:18: photos.camera:",
+        "has the id of a strip",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("photos", "strips", "place", "words"), [(*case[:3], case[3:]) for case in WRONG])
-def test_what_is_wrong_with_photos(
-    tmp_path: Path, photos: str, strips: str, place: str, words: tuple[str, ...]
-) -> None:
-    if strips and not strips.startswith("strips"):
-        strips = f"strips:\n{strips}"
-    project = with_photos(tmp_path, photos, strips)
-    project.tells(place, *words)
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_with_photos(tmp_path: Path, case: tuple[str, ...]) -> None:
+    photos, strips, place, *words = case
+    with_photos(tmp_path, photos, strips).tells(place, *words)
 
 
 def test_without_photos_of_any_kind(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -88,10 +89,6 @@ def messages(folder: Path, text: str, *overrides: str) -> list[str]:
     return [str(fault).removeprefix(f"{folder}/") for fault in caught.value.faults]
 
 
-def test_an_empty_specification_is_the_default(tmp_path: Path) -> None:
-    assert specification(tmp_path, "photostrip_simulation: 1\n").spec == Spec()
-
-
 def test_every_key_reaches_its_field(tmp_path: Path) -> None:
     spec = specification(tmp_path, EVERYTHING).spec
     distortion = Distortion("brown", "ideal_to_image", (1e-8, 0.0, 0.0), (0.0, 1e-7))
@@ -119,13 +116,16 @@ def test_every_key_reaches_its_field(tmp_path: Path) -> None:
     assert changed == []
 
 
-def test_a_part_without_values_is_the_part_with_its_defaults(tmp_path: Path) -> None:
-    spec = specification(tmp_path, "photostrip_simulation: 1\nfilm:\ngnss: {}\ncamera: {preset: digital}\n").spec
-    assert (spec.film, spec.gnss, spec.camera) == (Film(), Gnss(), DIGITAL)
-
-
-def test_one_word_says_how_all_control_is_given(tmp_path: Path) -> None:
-    assert specification(tmp_path, "photostrip_simulation: 1\ncontrol: {use: z}\n").spec.control.use == {"z": 1.0}
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", {}),
+        ("film:\ngnss: {}\ncamera: {preset: digital}\n", {"film": Film(), "gnss": Gnss(), "camera": DIGITAL}),
+        ("control: {use: z}\n", {"control": Control(use={"z": 1.0})}),  # one word says how all control is given
+    ],
+)
+def test_what_is_not_said_is_the_default(tmp_path: Path, text: str, expected: dict[str, Any]) -> None:
+    assert specification(tmp_path, f"photostrip_simulation: 1\n{text}").spec == Spec(**expected)
 
 
 def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
