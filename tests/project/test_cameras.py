@@ -8,7 +8,7 @@ import pytest
 import photostrip
 from photostrip.project.check import check_project
 from photostrip.strip.corrections import ideal_from_image
-from tests.project.samples import Sample
+from tests.project.samples import Sample, Y
 
 GIVEN = "    fiducials: {F1: [106, -106], F2: [-106, -106]}\n"
 LENS = "{model: brown, k: [1e-8, 0, 0], direction: image_to_ideal}"
@@ -22,7 +22,7 @@ def with_distances(places: str, distances: str) -> tuple[str, str]:
 
 
 def certified(marked: Sample, places: str, distances: str) -> list[str]:
-    marked.change("project.yaml", *with_distances(places, distances))
+    marked.change(Y, *with_distances(places, distances))
     return marked.lines()
 
 
@@ -66,7 +66,7 @@ def polynomial(xy: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("direction", ["image_to_ideal", "ideal_to_image"])
 def test_rays_have_the_directions_of_the_certificate(project: Sample, direction: str) -> None:
     lens = f"{{model: brown, k0: {K0}, k: {list(RADIAL)}, p: {list(DECENTRING)}, direction: {direction}}}"
-    project.change("project.yaml", LENS, lens)
+    project.change(Y, LENS, lens)
     loaded = project.load()
     camera = loaded.inputs.strips[0].camera
     assert camera.distortion is not None
@@ -106,7 +106,7 @@ TABLE = "{model: radial-table, k0: 1e-4, radius: [0, 9], distortion: [0, 0], dir
     ],
 )
 def test_certificates_that_are_wrong(marked: Sample, texts: tuple[str, str], place: str, words: str) -> None:
-    marked.change("project.yaml", *texts)
+    marked.change(Y, *texts)
     marked.tells(place, words)
 
 

@@ -6,9 +6,8 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.project.loading import load_project
-from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, Sample, sample
+from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, C, F, P, Sample, Y, sample
 
-Y, P, C, F = "project.yaml", "observations.csv", "control.csv", "fiducials.csv"
 SIGMA = "    sigma: [0.05, 0.06, 0.08]\n"
 SECOND_LIST = '  - {file: second.csv, crs: "EPSG:32634", axes: [east, north, up], sigma: [1, 1, 1]}\noutput:'
 

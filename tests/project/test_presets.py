@@ -9,7 +9,7 @@ import pytest
 from photostrip import run, simulation
 from photostrip.foreign.simulated import project_files
 from photostrip.simulation.simulation import simulate as simulated
-from tests.project.samples import FILES, MARKED_FILES, PROJECT, Sample, sample
+from tests.project.samples import FILES, MARKED_FILES, PROJECT, Sample, Y, sample
 from tests.source_tree import ROOT
 
 PRESET = """\
@@ -23,7 +23,7 @@ processing:
 
 def test_own_values_win_and_mappings_are_merged(project: Sample) -> None:
     project.write("preset.yaml", PRESET)
-    project.change("project.yaml", "name: sample", "extends: preset.yaml")
+    project.change(Y, "name: sample", "extends: preset.yaml")
     settings = project.load().settings
     assert settings.relative.grubbs_alpha == 0.05
     assert settings.relative.screening == "tau"
@@ -33,13 +33,13 @@ def test_own_values_win_and_mappings_are_merged(project: Sample) -> None:
 
 def test_lists_are_replaced(project: Sample) -> None:
     project.write("base.yaml", "strips:\n  - {id: Z, camera: Z, photos: [7, 8]}\n")
-    project.change("project.yaml", "name: sample", "extends: base.yaml")
+    project.change(Y, "name: sample", "extends: base.yaml")
     assert [strip.id for strip in project.load().inputs.strips] == ["A", "B"]
 
 
 def test_paths_of_a_preset_are_relative_to_it(project: Sample) -> None:
     old = PROJECT[PROJECT.index("observations:") : PROJECT.index("control:")]
-    project.change("project.yaml", old, "", "name: sample", "extends: shared/base.yaml")
+    project.change(Y, old, "", "name: sample", "extends: shared/base.yaml")
     project.write("shared/base.yaml", old)
     (project.folder / "observations.csv").rename(project.folder / "shared" / "observations.csv")
     loaded = project.load()
@@ -49,7 +49,7 @@ def test_paths_of_a_preset_are_relative_to_it(project: Sample) -> None:
 
 def test_faults_of_a_preset_are_told_there(project: Sample) -> None:
     project.write("shared/base.yaml", "photostrip: 1\nprocessing:\n  refracton: true\n  earth_radius: 0\n")
-    project.change("project.yaml", "name: sample", "extends: shared/base.yaml\nnmae: x")
+    project.change(Y, "name: sample", "extends: shared/base.yaml\nnmae: x")
     assert project.lines() == [
         "project.yaml:3:1: nmae: the key `nmae` is not known; did you mean `name`?",
         "shared/base.yaml:3:3: processing.refracton: the key `refracton` is not known; did you mean `refraction`?",
@@ -77,7 +77,7 @@ def test_faults_of_a_preset_are_told_there(project: Sample) -> None:
 def test_presets_that_cannot_be_read(project: Sample, files: dict[str, str], place: str, words: str) -> None:
     for name, text in files.items():
         project.write(name, text)
-    project.change("project.yaml", "name: sample", "extends: base.yaml")
+    project.change(Y, "name: sample", "extends: base.yaml")
     project.tells(place, words, alone=True)
 
 
@@ -96,7 +96,7 @@ def test_the_last_override_counts_and_before_the_file(project: Sample, assignmen
 
 def test_overrides_reach_lists_and_names_with_signs(project: Sample) -> None:
     text = (project.folder / "project.yaml").read_text(encoding="utf-8").replace("RC30", "RC.30")
-    project.write("project.yaml", text)
+    project.write(Y, text)
     changes = ["strips[0].id=0123", "strips.1.id='~'", 'cameras."RC.30".principal_point[1]=0.5', "control[0].crs=local"]
     inputs = project.load(changes).inputs
     assert [strip.id for strip in inputs.strips] == ["0123", "~"]
@@ -174,8 +174,8 @@ def bare(project: str, preset: str) -> str:
 def completed_by(folder: Path, preset: str, files: dict[str, str]) -> Sample:
     """Write a project that takes everything else from a preset."""
     project = sample(folder, files)
-    project.change("project.yaml", "    format: [230, 230]\n", "    format: [230, 230]\n    pixel_size: 0.01\n")
-    project.write("project.yaml", bare((folder / "project.yaml").read_text(encoding="utf-8"), preset))
+    project.change(Y, "    format: [230, 230]\n", "    format: [230, 230]\n    pixel_size: 0.01\n")
+    project.write(Y, bare((folder / "project.yaml").read_text(encoding="utf-8"), preset))
     return project
 
 
@@ -200,7 +200,7 @@ def test_film_presets_take_fiducial_marks(tmp_path: Path, preset: str) -> None:
 def test_a_standard_deviation_never_takes_its_unit_from_another_file(tmp_path: Path) -> None:
     preset = CONFIGS / "film-mapping.yaml"
     project = completed_by(tmp_path, preset.stem, FILES)
-    project.change("project.yaml", "  file: observations.csv", "  file: observations.csv\n  unit: px\n  y_axis: down")
+    project.change(Y, "  file: observations.csv", "  file: observations.csv\n  unit: px\n  y_axis: down")
     message = f"sigma stands in {preset}, its unit in project.yaml; write both in one file"
     assert project.lines() == [f"{preset}:9:10: observations.sigma: {message}"]
     assert project.load(["observations.sigma=0.3"]).inputs.observations.sigma[0, 0] == pytest.approx(0.003)
