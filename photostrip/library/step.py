@@ -117,8 +117,8 @@ def _relative(given: keys.RelativeKeys, ids: list[str], left: Floats, right: Flo
     )
     yield _points(ids, ("q", "um 2", found.parallax * MICROMETRES), ("x y z", f"{unit} 4", found.model))
     (rounds,) = first_rounds(one_pair(left, right, focal), found.elements[None])
-    before, added = (np.degrees([getattr(each, name) for each in rounds.steps]) for name in ("elements", "step"))
-    squares, named = ("[qq]", "mm^2 e4", [each.squares for each in rounds.steps]), " ".join(ELEMENTS)
+    squares, named = ("[qq]", "mm^2 e4", rounds.squares), " ".join(ELEMENTS)
+    before, added = np.degrees(rounds.elements[:-1]), np.degrees(rounds.added)
     yield _iterations("Elements before each step", "eq. 131-137", squares, (named, "deg 6", before))
     yield _iterations("What the step adds", "-(J'J)^-1 J'q, J the derivatives of q", (named, "deg e2", added))
     alpha1, kappa1, alpha2, omega2, kappa2 = found.elements

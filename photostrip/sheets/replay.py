@@ -23,27 +23,17 @@ START_DIGITS = 1  # of radians: where a pair starts whose start values do not le
 SAME_ELEMENTS = 1e-6  # radians
 
 
-@dataclass(frozen=True, eq=False)
-class PairStep:
-    elements: Floats  # (5,): alpha1', kappa1', alpha2', omega2', kappa2' before the step, radians
-    squares: float  # [w q q], sum of weighted squares of the y parallaxes before the step, mm^2
-    step: Floats  # (5,): what is added, radians
+SimilarityStep = tuple[Similarity, float, Floats]  # before the step; [w v v]; three shifts, three rotations, the scale
 
 
 @dataclass(frozen=True, eq=False)
 class PairRound:
-    """The iteration of a pair with one choice of points."""
+    """The iteration of a pair with one choice of points: alpha1', kappa1', alpha2', omega2', kappa2', radians."""
 
     points: int
-    steps: tuple[PairStep, ...]
-    end: Floats  # (5,): elements in the end, radians
-
-
-@dataclass(frozen=True, eq=False)
-class SimilarityStep:
-    similarity: Similarity
-    squares: float
-    step: Floats  # (7,): three shifts, three rotations and the scale, metres at the end of the strip
+    squares: Floats  # (n,): [w q q], sum of weighted squares of the y parallaxes before each step, mm^2
+    added: Floats  # (n, 5): what each step adds
+    elements: Floats  # (n + 1, 5): before each step and in the end
 
 
 def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
@@ -52,7 +42,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     given = _with_all_points(result, strip)
     rounds = [[first] for first in first_rounds(given, final.elements)]
     changed = np.unique(given.pair[given.weight != final.pairs.weight])
-    ends = np.array([each[-1].end for each in rounds])
+    ends = np.array([each[-1].elements[-1] for each in rounds])
     for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)), strict=True):
         rounds[number].append(second)
     return rounds
@@ -81,17 +71,20 @@ def first_rounds(pairs: Pairs, wanted: Floats) -> list[PairRound]:
 
 def _round(start: Floats, pairs: Pairs) -> list[PairRound]:
     """Iterate all pairs and keep their steps."""
-    steps: list[list[PairStep]] = [[] for _ in range(pairs.size)]
+    steps: list[list[tuple[float, Floats, Floats]]] = [[] for _ in range(pairs.size)]
 
     def watch(todo: Numbers, elements: Floats, squares: Floats, step: Floats) -> None:
-        for n, number in enumerate(todo.tolist()):
-            steps[number].append(PairStep(elements[n].copy(), float(squares[n]), step[n].copy()))
+        for number, *each in zip(todo.tolist(), squares, step, elements, strict=True):
+            steps[number].append(tuple(each))
 
     if not pairs.size:
         return []
     ends = iterate_elements(start, pairs, watch).elements
-    counts = pairs.sums((pairs.weight > 0).astype(float)).astype(int).tolist()
-    return [PairRound(*each) for each in zip(counts, map(tuple, steps), ends, strict=True)]
+    rounds = []
+    for count, taken, end in zip(pairs.sums((pairs.weight > 0).astype(float)), steps, ends, strict=True):
+        squares, added, elements = map(np.array, zip(*taken, strict=True))
+        rounds.append(PairRound(int(count), squares, added, np.vstack([elements, end])))
+    return rounds
 
 
 def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]:
@@ -105,7 +98,7 @@ def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]
     def watch(similarity: Similarity, step: Floats) -> None:
         xyz = similarity(points)
         squares = float((weight * targets.misclosures(xyz, targets.axes(xyz)) ** 2).sum())
-        steps.append(SimilarityStep(replace(similarity), squares, step.copy()))
+        steps.append((replace(similarity), squares, step.copy()))
 
     absolute_orientation.lay(points, targets, weight, strip.formed.xyz, watch)
     return steps

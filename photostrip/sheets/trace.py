@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import compress
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from photostrip.geometry.similarity import pair_scales
 from photostrip.notes import counted
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.report.page.parts import Facts, Words
-from photostrip.report.page.tables import Cell, Field, fields, written
+from photostrip.report.page.tables import Cell, Field, fields, with_unit, written
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.sheets.replay import PairRound, pair_rounds, similarity_steps
 from photostrip.sheets.sheet import Fact, Filled, Rows, Sheet, filled, hidden, same, table, taken
@@ -29,10 +29,10 @@ CUBIC = 3  # degree of eq. 150
 DEGREE = "polynomial.degree"
 FOUR_BANDS = "control at four distances along the strip"
 PAIRED = 15  # control points whose 105 distances can still be read
-PRIMED = ("α1′", "κ1′", "α2′", "ω2′", "κ2′")
-TURNS, TURN_HEADS = ("alpha", "omega", "kappa"), ("α", "ω", "κ")
+ANGLES, PRIMED = " ".join(ELEMENTS), "α1′ κ1′ α2′ ω2′ κ2′"
+TURNS, TURN_HEADS = "alpha omega kappa", "α ω κ"
 END, NOTHING = Cell("end", None), Cell("", None)
-TESTS = {"parallax": "|q|, mm,", "grubbs": "Grubbs' G", "tau": "tau"}
+TESTS = {"parallax": "|q|, mm", "grubbs": "Grubbs' G", "tau": "tau"}
 SYMBOLS = {
     "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
     "alpha1 to kappa2": "elements of relative orientation in the base frame, written with a prime",
@@ -55,104 +55,63 @@ SYMBOLS = {
 MATRIX = tuple(f"{row}{column}" for row in "abc" for column in "123")
 
 
-class Departure(NamedTuple):
-    subject: str
-    source: str  # where the textbook decides
-    key: str  # of ``processing``
-    textbook: tuple[str, ...]  # values of the key that follow it
-    words: str  # what the textbook does
-    here: dict[str, str]  # what the program does, by its name for it
-
-
+# subject, where the textbook decides, key of ``processing``, its value that follows the textbook, what this does
 CHOICES = (
-    Departure(
-        subject="gross errors in pairs",
-        source="[004a]",
-        key="relative.screening",
-        textbook=("parallax+grubbs",),
-        words="residual y parallax, then Grubbs' test",
-        here={
-            "auto": "robust start where needed, search for the smallest set of wrong points, readmission",
-            "tau": "residual over its own standard deviation",
-            "deletion": "search for the smallest set of wrong points",
-            "robust": "re-weighting",
-            "none": "not searched for",
-        },
+    (
+        "gross errors in pairs",
+        "[004a]",
+        "relative.screening",
+        "parallax+grubbs",
+        "residual y parallax, then Grubbs' test",
     ),
-    Departure(
-        subject="intersection",
-        source="eq. 138",
-        key="intersection",
-        textbook=("left",),
-        words="point on the left ray",
-        here={"mean": "Y is the mean of both rays, in the base frame"},
+    ("intersection", "eq. 138", "intersection", "left", "point on the left ray"),
+    (
+        "scale transfer",
+        "eq. 139-141",
+        "scale_transfer",
+        "distances",
+        "mean of the ratios of distances, weights as chosen",
     ),
-    Departure(
-        subject="scale transfer",
-        source="eq. 139-141",
-        key="scale_transfer",
-        textbook=("distances",),
-        words="mean of the ratios of distances, weights as chosen",
-        here={"least_squares": "ratios weighted by their precision"},
-    ),
-    Departure(
-        subject="control",
-        source="eq. 149",
-        key="control_weights",
-        textbook=("equal",),
-        words="equal weights",
-        here={"stated": "weighted by their standard deviations and those of the strip's points"},
-    ),
-    Departure(
-        subject="adjustment",
-        source="eq. 150",
-        key="adjustment",
-        textbook=("polynomial",),
-        words="polynomials",
-        here={
-            "similarity": "none",
-            "bundle": "bundle adjustment, which the strip only starts",
-        },
-    ),
-    Departure(
-        subject="degree",
-        source="eq. 150",
-        key=DEGREE,
-        textbook=("3",),
-        words="cubic",
-        here={},
-    ),
+    ("control", "eq. 149", "control_weights", "equal", "equal weights"),
+    ("adjustment", "eq. 150", "adjustment", "polynomial", "polynomials"),
+    ("degree", "eq. 150", DEGREE, str(CUBIC), "cubic"),
 )
+HERE = {  # what the program does by other values of the keys
+    "auto": "robust start where needed, search for the smallest set of wrong points, readmission",
+    "tau": "residual over its own standard deviation",
+    "deletion": "search for the smallest set of wrong points",
+    "robust": "re-weighting",
+    "none": "not searched for",
+    "mean": "Y is the mean of both rays, in the base frame",
+    "least_squares": "ratios weighted by their precision",
+    "stated": "weighted by their standard deviations and those of the strip's points",
+    "similarity": "none",
+    "bundle": "bundle adjustment, which the strip only starts",
+}
 
 
 def departures_of(result: Result) -> list[tuple[str, ...]]:
     """Return where what a run did departs from the textbook, whatever its settings asked for."""
-    settings = result.settings
-    degrees, asked = [_degrees(strip) for strip in result.strips], settings.polynomial.degree
-    whole = all(degree == (CUBIC, CUBIC) for degree in degrees)
+    settings, asked = result.settings, result.settings.polynomial.degree
+    formed = any(strip.polynomial is not None for strip in result.strips)
+    degrees = dict.fromkeys(map(_degrees, result.strips))
+    said = "; ".join(f"{plan} in plan, {height} in height" for plan, height in degrees)
     done = {
         "relative.screening": settings.relative.screening,
         "intersection": settings.formation.intersection,
         "scale_transfer": settings.formation.scale_transfer,
-        "adjustment": "bundle" if result.bundle is not None else _adjusted(result),
-        DEGREE: str(CUBIC) if whole else _said_degrees(degrees, asked),
+        "adjustment": "bundle" if result.bundle is not None else "polynomial" if formed else "similarity",
+        DEGREE: f"{said} ({'by evidence' if asked == 'auto' else f'{asked} asked for'})",
         "control_weights": settings.absolute.control_weights,
     }
+    if set(degrees) == {(CUBIC, CUBIC)}:
+        done[DEGREE] = str(CUBIC)
+    cures = {DEGREE: FOUR_BANDS} if asked == str(CUBIC) else {}
     return [
-        (
-            each.subject,
-            each.source,
-            each.words,
-            each.here.get(done[each.key], done[each.key]),
-            FOUR_BANDS if each.key == DEGREE and asked == str(CUBIC) else f"processing.{each.key}: {each.textbook[0]}",
-        )
-        for each in CHOICES
-        if done[each.key] not in each.textbook
+        (subject, source, words, HERE.get(done[key], done[key]), cures.get(key, f"processing.{key}: {textbook}"))
+        for subject, source, key, textbook, words in CHOICES
+        if done[key] != textbook
     ]
-
-
-def _adjusted(result: Result) -> str:
-    return "polynomial" if any(strip.polynomial is not None for strip in result.strips) else "similarity"
 
 
 def _degrees(strip: StripResult) -> tuple[int, int]:
@@ -161,12 +120,6 @@ def _degrees(strip: StripResult) -> tuple[int, int]:
         return 0, 0
     plan, _, height = (degree_of(axis.terms) for axis in strip.polynomial.axes)
     return plan, height
-
-
-def _said_degrees(degrees: Sequence[tuple[int, int]], asked: str) -> str:
-    told = [f"{plan} in plan, {height} in height" for plan, height in dict.fromkeys(degrees)]
-    why = "by evidence" if asked == "auto" else f"{asked} asked for"
-    return f"{'; '.join(told)} ({why})"
 
 
 def trace_sheet(result: Result) -> Sheet:
@@ -190,10 +143,6 @@ def trace_sheet(result: Result) -> Sheet:
     return Sheet("trace", f"Trace: {result.inputs.name}", facts, tables, main="pair_points")
 
 
-def _greek(keys: Sequence[str], heads: Sequence[str], form: str, rank: int = 0) -> tuple[Field, ...]:
-    return tuple(Field(key, form, head, rank=rank) for key, head in zip(keys, heads, strict=True))
-
-
 def _used(used: Iterable[Any]) -> Filled:
     return Field("used", head=""), [Cell("" if each else "not used", bool(each)) for each in used]
 
@@ -213,35 +162,26 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
         for count, each in enumerate(rounds, 1):
             yield _round(who, each, count, unit, f"Relative orientation of {left} – {right}" if count == 1 else "")
         rejected = [each for each in strip.of_photos.rejections if orientation.pairs.pair[each.row] == number]
-        columns = (
+        rejections = (
             Field("point", head="rejected", of=lambda each: ids[orientation.point[each.row]]),
             Field("test"),
             *fields("value limit", "ratio g4"),
             Field("q", "mm 4", of="worst"),
             Field("readmitted", head="", of=lambda at: Cell("taken back" if at.readmitted else "", at.readmitted)),
         )
-        yield table("pair_rejected", "", [*who, *taken(columns, rejected)])
+        yield table("pair_rejected", "", [*who, *taken(rejections, rejected)])
         yield from _largest(result, strip, number, who)
         base = bases[number] * formed.first.base
-        angles = [*np.array(base_angles(bases[number])) * factor, *_turned(rotations[number], factor).ravel()]
-        told = ", ".join(f"{name} {value:z.6f}" for name, value in zip(("bx", "by", "bz"), base, strict=True))
-        turns = zip(("τ", "ν", *TURN_HEADS), angles, strict=True)
-        told += f"; {', '.join(f'{name} {value:z.6f}' for name, value in turns)} {unit}."
-        sigma0 = orientation.sigma0[number] * 1000
-        keys = hidden(*ELEMENTS, "bx", "by", "bz", "tau", "nu", *TURNS, form=f"{unit} 6")
-        yield table(
-            "pairs",
-            "",
-            [
-                *who,
-                (Field("sigma0_um", "um 2", shown=False), sigma0),
-                *filled(keys, [[*orientation.elements[number] * factor, *base, *angles]]),
-            ],
-            above=(
-                f"In the system of the left photo: {told}",
-                f"σ0 of an image coordinate: {written(sigma0, 'um 2')} µm. The points, eq. 137-138:",
-            ),
-        )
+        turns = [*np.array(base_angles(bases[number])) * factor, *_turned(rotations[number], factor).ravel()]
+        columns = [
+            *who,
+            (Field("sigma0_um", "um 2", "σ0"), orientation.sigma0[number] * 1000),
+            *filled(hidden(*ELEMENTS, form=f"{unit} 6"), [orientation.elements[number] * factor]),
+            *filled(fields("bx by bz", " 6"), [base]),
+            *filled(fields(f"tau nu {TURNS}", f"{unit} 6", f"τ ν {TURN_HEADS}"), [turns]),
+        ]
+        note = "σ0 of an image coordinate; base and right photo in the system of the left one. The points, eq. 137-138:"
+        yield table("pairs", "", columns, note=note)
         yield _points(result, strip, number, who)
 
 
@@ -253,29 +193,23 @@ def _largest(result: Result, strip: StripResult, number: int, who: Sequence[Fill
     for test, bound in stages(result.settings.relative, strip.of_photos.sigma):
         value, limit, _ = (each[rows] for each in tested(orientation, test, bound))
         worst = int(np.argmax(np.where(orientation.used[rows], value, -np.inf)))
-        tests.append((test, ids[orientation.point[rows[worst]]], value[worst], limit[worst]))
-    said = [f"{TESTS[test]} {value:.4g} at {point}, limit {limit:.4g}" for test, point, value, limit in tests]
-    columns = [*who, *filled((*hidden("test", "point"), *hidden("value", "limit", form="ratio g5")), tests)]
-    yield table("pair_tests", "", columns, above=[f"What is left: {'; '.join(said)}."] if said else [])
+        tests.append((Cell(TESTS[test], test), ids[orientation.point[rows[worst]]], value[worst], limit[worst]))
+    columns = (Field("test", head="what is left"), Field("point"), *fields("value limit", "ratio g4"))
+    yield table("pair_tests", "", [*who, *filled(columns, tests)])
 
 
 def _round(who: Sequence[Filled], each: PairRound, count: int, unit: str, title: str) -> Rows:
     """Give elements before each step and what is added, in the end the elements found."""
     factor, which = PER_RADIAN[unit], "all points" if count == 1 else "without the rejected points"
-    added = [f"d_{name}" for name in ELEMENTS], [f"d{name}" for name in PRIMED]
+    added = (f"d_{name}" for name in ELEMENTS), (f"d{name}" for name in PRIMED.split())
+    steps = fields(" ".join(added[0]), f"{unit} e1", " ".join(added[1]), rank=1)
     columns = [
         *who,
         *same(round=count, points=each.points),
-        (Field("iteration", "count", "step"), [*range(1, len(each.steps) + 1), END]),
-        (Field("[wqq]", "mm² e4"), [*(step.squares for step in each.steps), NOTHING]),
-        *filled(
-            _greek(ELEMENTS, PRIMED, f"{unit} 6"),
-            np.array([*(step.elements for step in each.steps), each.end]) * factor,
-        ),
-        *filled(
-            _greek(*added, f"{unit} e1", rank=1),
-            [*(step.step * factor for step in each.steps), [NOTHING] * len(ELEMENTS)],
-        ),
+        (Field("iteration", "count", "step"), [*range(1, len(each.squares) + 1), END]),
+        (Field("[wqq]", "mm² e4"), [*each.squares, NOTHING]),
+        *filled(fields(ANGLES, f"{unit} 6", PRIMED), each.elements * factor),
+        *filled(steps, [*each.added * factor, [NOTHING] * len(ELEMENTS)]),
     ]
     above = [Words(f"Round {count}, {which}: {counted(each.points, 'point')}", "head")]
     return table("pair_steps", title, columns, above=above)
@@ -307,12 +241,12 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     bases = np.column_stack([directions, np.diff(formed.centers, axis=0), formed.scale_factor])
     who, photo = same(strip=strip.strip.id), (Field("photo"), list(photos))
     places, turns = fields(" ".join(MATRIX), " 8"), formed.rotations.reshape(-1, 9)
-    before = (*_greek(("tau", "nu"), ("τ", "ν"), f"{unit} 6"), *fields("BX BY BZ", " 6"), Field("k", " 7"))
+    before = (*fields("tau nu", f"{unit} 6", "τ ν"), *fields("BX BY BZ", " 6"), Field("k", " 7"))
     columns = [
         *who,
         photo,
         *filled(before, [[NOTHING] * len(before), *bases]),
-        *filled(_greek(TURNS, TURN_HEADS, f"{unit} 6"), _turned(formed.rotations, factor)),
+        *filled(fields(TURNS, f"{unit} 6", TURN_HEADS), _turned(formed.rotations, factor)),
         *filled(fields("Xs Ys Zs", " 6"), formed.centers),
         *filled(hidden(*MATRIX, form=" 8"), turns),
     ]
@@ -321,9 +255,7 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     yield table("", "", [photo, *filled(places, turns)], note=note)
     frames = base_frames(formed.rotations[:-1], strip.of_photos.orientation.elements).reshape(-1, 9)
     pair = [(Field("left"), list(photos[:-1])), (Field("right"), list(photos[1:]))]
-    note = (
-        "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; its first column is the base."
-    )
+    note = "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; first column: the base."
     yield table("base_frames", "", [*who, *pair, *filled(places, frames)], note=note)
 
 
@@ -348,11 +280,8 @@ def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:
             _used(joined.used[rows]),
         ]
         yield table("junction_points", f"Scale transfer at photo {photo}, eq. 139-141", columns)
-        one = joined.spread[number] * k
-        spread = "" if np.isnan(one) else f"; standard deviation of one ratio {one:.1e}"
-        said = f"k = {k:z.9f} ({form.replace('_', ' ')}){spread}."
-        found = [*who, *same(form=form), *filled(hidden("k", "sd_of_one", form=" 7"), [[k, one]])]
-        yield table("junctions", "", found, above=[said])
+        found = [*fields("k", " 9"), Field("form", head="weights"), Field("sd_of_one", " e1", "sd of one ratio")]
+        yield table("junctions", "", [*who, *filled(found, [(k, form, joined.spread[number] * k)])])
 
 
 def _absolute(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
@@ -360,33 +289,34 @@ def _absolute(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     points, who, sigma0 = strip.formed.xyz[strip.control_rows], same(strip=strip.strip.id), strip.absolute.sigma0
     moved = similarity(points)
     given = absolute_orientation.Targets(strip.control, result.frames, frame).of(moved)
-    axes = "; ".join(" ".join(f"{value:z.9f}" for value in row) for row in frame.axes)
-    origin = ", ".join(f"{value:z.4f}" for value in frame.origin)
-    facts = Facts((("A0", f"{frame.azimuth * factor:z.6f} {unit}"), ("origin, m", origin), ("M, by rows", axes)))
+    facts = Facts(
+        (
+            ("A0", with_unit(frame.azimuth * factor, f"{unit} 6")),
+            ("origin, m", written(frame.origin, "m 4")),
+            ("M, by rows", "; ".join(written(row, " 9") for row in frame.axes)),
+        )
+    )
     keys = hidden("A0", "origin_x", "origin_y", "origin_z", *(f"M_{place}" for place in MATRIX), form=" 7")
     laid = filled(keys, [[frame.azimuth * factor, *frame.origin, *frame.axes.ravel()]])
     columns = [*who, *laid, (Field("sigma0", " g4", shown=False), sigma0)]
     yield table("absolute", f"Absolute orientation of strip {strip.strip.id}, eq. 142-149", columns, above=[facts])
     yield from _approximate(strip, points, given, similarity.scale)
     steps = similarity_steps(result, strip)
-    states = [*(step.similarity for step in steps), similarity]
+    before, squares, added = zip(*steps, strict=True)
+    states, turns = (
+        [*before, similarity],
+        hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1"),
+    )
     columns = [
         *who,
         (Field("iteration", "count", "step"), [*range(1, len(steps) + 1), END]),
-        (Field("[wvv]", " g6"), [*(step.squares for step in steps), NOTHING]),
+        (Field("[wvv]", " g6"), [*squares, NOTHING]),
         (Field("s", " 7"), [each.scale for each in states]),
         *filled(
-            _greek(("xi", "eta", "theta"), ("ξ", "η", "θ"), f"{unit} 6"),
-            _turned(np.array([each.rotation for each in states]), factor),
+            fields("xi eta theta", f"{unit} 6", "ξ η θ"), _turned(np.array([each.rotation for each in states]), factor)
         ),
-        *filled(fields("X0 Y0 Z0", "m 4"), np.array([each.shift for each in states])),
-        *filled(
-            (
-                *fields("dX0 dY0 dZ0", "m e1", rank=1),
-                *hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1"),
-            ),
-            [*(step.step for step in steps), [NOTHING] * 7],
-        ),
+        *filled(fields("X0 Y0 Z0", "m 4"), [each.shift for each in states]),
+        *filled((*fields("dX0 dY0 dZ0", "m e1", rank=1), *turns), [*added, [NOTHING] * 7]),
     ]
     yield table("similarity_steps", "", columns, note="no redundancy" if np.isnan(sigma0) else f"σ0 = {sigma0:.4g}")
     columns = [
@@ -418,11 +348,9 @@ def _approximate(strip: StripResult, points: Floats, given: Floats, scale: float
         (Field("r", " g9"), (found.target / found.source)[few]),
     ]
     yield table("control_distances", "", columns)
-    r, t = found.mean, scale / found.mean
-    center = ", ".join(f"{value:z.6f}" for value in centroid)
-    said = f"r = {r:.9g}, t = s/r = {t:.9g}; centroid of the strip's control {center}."
-    places = filled(hidden("centroid_x", "centroid_y", "centroid_z", form=" 6"), centroid[None])
-    yield table("approximate", "", [*who, *filled(hidden("r", "t", form=" g9"), [[r, t]]), *places], above=[said])
+    columns = [*who, *filled(fields("r t", " g9"), [(found.mean, scale / found.mean)])]
+    columns += filled(fields("centroid_x centroid_y centroid_z", " 6"), [centroid])
+    yield table("approximate", "", columns, note="t = s/r; the centroid is that of the strip's control.")
 
 
 def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
