@@ -9,6 +9,7 @@ from photostrip.project.loading import load_project
 from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, Sample, sample
 
 Y, P, C, F = "project.yaml", "observations.csv", "control.csv", "fiducials.csv"
+SIGMA = "    sigma: [0.05, 0.06, 0.08]\n"
 SECOND_LIST = '  - {file: second.csv, crs: "EPSG:32634", axes: [east, north, up], sigma: [1, 1, 1]}\noutput:'
 
 # The file, what is replaced in it by what, where the fault begins, and words that it must have.
@@ -55,23 +56,23 @@ SCHEMA = [
     (Y, "153.217", "0", "project.yaml:5:25:", "out of range"),
     (
         Y,
-        "    photos: [1001, 1002]\n",
-        "    photos: [1001, 1002]\n    first_photo: {base: 0}\n",
+        "1002]\n",
+        "1002]\n    first_photo: {base: 0}\n",
         "project.yaml:13:25: strips[0].first_photo.base:",
         "out of range",
         "larger than 0",
     ),
     (
         Y,
-        "    photos: [1001, 1002]\n",
-        "    photos: [1001, 1002]\n    first_photo: {angles: [1, 2, 3], unit: grad}\n",
-        "project.yaml:13:44: strips[0].first_photo.unit:",
+        "1002]\n",
+        "1002]\n    first_photo: {unit: grad}\n",
+        "project.yaml:13:25: strips[0].first_photo.unit:",
         "one of deg, gon, rad",
     ),
     (
         Y,
-        "processing:\n",
-        "processing:\n  intersection: right\n",
+        "processing:",
+        "processing:\n  intersection: right",
         "project.yaml:30:17: processing.intersection:",
         "one of mean, left",
     ),
@@ -105,16 +106,16 @@ SCHEMA = [
     (Y, PROJECT[PROJECT.index("cameras:") : PROJECT.index("strips:")], "cameras:\n", "project.yaml:3:9:", "no camera"),
     (
         Y,
-        "processing:\n",
-        "processing:\n  adjustment: covariance\n",
+        "processing:",
+        "processing:\n  adjustment: covariance",
         "project.yaml:30:15: processing.adjustment:",
         "`covariance` is not known",
         "write `bundle`",
     ),
     (
         Y,
-        "processing:\n",
-        "processing:\n  covariance: {distances: false}\n",
+        "processing:",
+        "processing:\n  covariance: {distances: false}",
         "project.yaml:30:3: processing.covariance:",
         "`adjustment: bundle` took its place",
     ),
@@ -217,14 +218,7 @@ TABLES = [
     (C, "P2", "G1", "control.csv:3:1: point:", "G1 is already given in control.csv:2"),
     (C, "500100.12", "500100.12 m", "control.csv:2:4: x:", "unit in it"),
     (C, "500100.12", "500 100.12", "control.csv:2:4: x:", "digits in groups"),
-    (
-        Y,
-        "    sigma: [0.05, 0.06, 0.08]\n",
-        "",
-        "control.csv:2: sx:",
-        "no standard deviation for G1",
-        "sigma: [sx, sy, sz]",
-    ),
+    (Y, SIGMA, "", "control.csv:2: sx:", "no standard deviation for G1", "sigma: [sx, sy, sz]"),
 ]
 MARKS = [
     (F, "1001,F1", "1001,F3", "fiducials.csv:2:6: mark:", "camera RC30 has no mark F3", "one of F1, F2"),
@@ -235,13 +229,7 @@ MARKS = [
     (Y, ", F2: [-106, -106]", "", "project.yaml:8:16: cameras.RC30.fiducials:", "one mark alone"),
     (Y, "  y_axis: up", "  origin: center", "project.yaml:20:11: observations.origin:", "means nothing here"),
     (Y, "{file: fiducials.csv}", "{file: fiducials.csv, unit: px}", "project.yaml:5:5:", "has no pixel_size"),
-    (
-        Y,
-        "{file: fiducials.csv}",
-        "{file: fiducials.csv, unit: um}",
-        "fiducials.csv:2: sx:",
-        "fiducial_measurements.sigma",
-    ),
+    (Y, "fiducials.csv}", "fiducials.csv, unit: um}", "fiducials.csv:2: sx:", "fiducial_measurements.sigma"),
 ]
 ONE_FAULT = [*YAML_SYNTAX, *YAML_MANNERS, *SCHEMA, *NOT_YET, *REFERENCES, *FRAMES, *FILES_NAMED, *TABLES]
 
@@ -266,9 +254,6 @@ def test_wrong_fiducial_marks_are_explained(
 def test_the_samples_are_right(tmp_path: Path, files: dict[str, str]) -> None:
     assert sample(tmp_path, files).lines() == []
     assert (files is FILES) or ("fiducials" in MARKED)
-
-
-# ------------------------------------------------------------------------------------------- whole files
 
 
 # ten copies of ten copies and so on: a file of 200 characters that would fill any memory
@@ -311,9 +296,6 @@ def test_a_missing_project_names_its_neighbour(project: Sample) -> None:
         load_project(project.folder / "projct.yaml")
     with pytest.raises(InputError, match=r"is a folder; expected a file; did you mean `.*/project\.yaml`\?"):
         load_project(project.folder)
-
-
-# -------------------------------------------------------------------------------------- several faults at once
 
 
 def test_faults_of_all_files_come_together(marked: Sample) -> None:

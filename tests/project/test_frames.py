@@ -27,6 +27,9 @@ control:
 """
 
 
+NORTH = "    axes: [east, north, up]\n"
+
+
 def project(folder: Path, common: int = 5, role: str = "control") -> tuple[Sample, np.ndarray]:
     """Write a project whose point P2 is known in the other zone only; return its coordinates in the first zone."""
     west, east = in_both(common + 2, 10_000.0)
@@ -58,29 +61,22 @@ def test_two_points_join_without_a_check(tmp_path: Path) -> None:
     assert note.message.endswith("with powers up to 1: nothing checks them")
 
 
-def test_check_points_join_nothing(tmp_path: Path) -> None:
-    (line,) = project(tmp_path, role="check")[0].lines()
-    assert line.startswith("project.yaml:30:17: control[1].other_zone: 0 points of this list in the first one")
-
-
-def test_one_common_point_is_not_enough(tmp_path: Path) -> None:
-    (line,) = project(tmp_path, 1)[0].lines()
-    assert "1 point of this list" in line
-
-
-def test_zones_of_known_projections_need_no_points(tmp_path: Path) -> None:
-    given, _ = project(tmp_path)
-    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("crs: local", "crs: EPSG:32633")
-    given.write("project.yaml", text)
-    assert any("other_zone: zones of a known projection are tied by their formulas" in line for line in given.lines())
-
-
-def test_the_first_list_is_no_other_zone(tmp_path: Path) -> None:
-    given, _ = project(tmp_path)
+@pytest.mark.parametrize(
+    ("common", "role", "old", "new", "place", "words"),
+    [
+        (5, "check", "", "", "project.yaml:30:17: control[1].other_zone:", "0 points of this list in the first one"),
+        (1, "control", "", "", "project.yaml:30:17: ", "1 point of this list"),
+        (5, "control", "crs: local", "crs: EPSG:32633", "", "zones of a known projection are tied by their formulas"),
+        (5, "control", NORTH, f"{NORTH}    other_zone: true\n", "", "brought into the zone of the first one"),
+    ],
+)
+def test_zones_that_cannot_be_joined(
+    tmp_path: Path, common: int, role: str, old: str, new: str, place: str, words: str
+) -> None:
+    given, _ = project(tmp_path, common, role)
     text = (tmp_path / "project.yaml").read_text(encoding="utf-8")
-    axes = "    axes: [east, north, up]\n"
-    given.write("project.yaml", text.replace(axes, f"{axes}    other_zone: true\n", 1))
-    assert any("brought into the zone of the first one" in line for line in given.lines())
+    given.write("project.yaml", text.replace(old, new, 1) if old == NORTH else text.replace(old, new))
+    given.tells(place, "other_zone: ", words)
 
 
 SAMPLE = Path("sample_data/simulated-20")

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Distortion
-from photostrip.errors import InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.loading import Project, load_project
-from tests.project.samples import CONTROL, OBSERVATIONS, PROJECT, Sample, sample
+from tests.project.samples import CONTROL, FIDUCIALS, OBSERVATIONS, PROJECT, Sample, sample
 
 NANOMETRE = 1e-6  # mm
 
@@ -29,41 +28,25 @@ def notes(project: Project) -> dict[str, Note]:
     return {note.code: note for note in project.hints}
 
 
-# ------------------------------------------------------------------------------------------------ the plain case
-
-
-def test_cameras_and_strips(tmp_path: Path) -> None:
-    inputs = sample(tmp_path).load().inputs
-    camera = inputs.strips[0].camera
+def test_the_sample(project: Sample) -> None:
+    inputs = project.load().inputs
+    camera, table, control = inputs.strips[0].camera, inputs.observations, inputs.control
     assert inputs.name == "sample"
     assert [(strip.id, strip.photos) for strip in inputs.strips] == [("A", ("1001", "1002")), ("B", ("2001", "2002"))]
     assert (camera.name, camera.principal_distance, camera.principal_point) == ("RC30", 153.217, (0.012, -0.004))
     assert camera.format == (230.0, 230.0)
     assert camera.distortion == Distortion("brown", "image_to_ideal", (1e-8, 0.0, 0.0), (0.0, 0.0))
     assert inputs.strips[1].camera is camera
-
-
-def test_image_points(tmp_path: Path) -> None:
-    table = sample(tmp_path).load().inputs.observations
-    assert table.photo_ids == ("1001", "1002", "2001", "2002")
-    assert table.point_ids == ("P1", "P2", "G1")
-    assert table.photo.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
-    assert table.point.tolist() == [0, 1, 0, 1, 1, 2, 1, 2]
+    assert (table.photo_ids, table.point_ids) == (("1001", "1002", "2001", "2002"), ("P1", "P2", "G1"))
+    assert (table.photo.tolist(), table.point.tolist()) == ([0, 0, 1, 1, 2, 2, 3, 3], [0, 1, 0, 1, 1, 2, 1, 2])
     assert table.xy[:2].tolist() == [[10.5, -20.25], [11.5, 20.25]]
     assert table.sigma.tolist() == [[0.005, 0.005]] * 8
-
-
-def test_control(tmp_path: Path) -> None:
-    project = sample(tmp_path).load()
-    control = project.inputs.control
-    assert control.ids == ("G1", "P2")
     np.testing.assert_array_equal(control.enu, [[500100.12, 4649871.40, 212.31], [500200.12, 4649971.40, np.nan]])
+    assert (control.ids, control.check.tolist()) == (("G1", "P2"), [False, True])
     assert control.use.tolist() == [[True, True, True], [True, True, False]]
-    assert control.check.tolist() == [False, True]
     assert control.sigma[0].tolist() == [0.05, 0.06, 0.08]
-    assert project.inputs.frames == (FrameSpec("EPSG:32633", ("east", "north", "up")),)
-    assert project.inputs.output is None
-    assert project.inputs.fiducials is None
+    assert inputs.frames == (FrameSpec("EPSG:32633", ("east", "north", "up")),)
+    assert (inputs.output, inputs.fiducials) == (None, None)
 
 
 def test_settings_not_given_are_the_defaults_of_the_mathematics(project: Sample) -> None:
@@ -142,9 +125,6 @@ def test_paths_behind_a_link_lead_where_the_system_finds_them(tmp_path: Path) ->
     assert 'file: "../o.csv"' in loaded.resolved
 
 
-# ------------------------------------------------------------------------------------------- units of photos
-
-
 def image_case(folder: Path, system: str, row: str) -> tuple[float, float]:
     """Load a project whose first point is `row` and give where it comes out, in mm."""
     project = sample(folder)
@@ -211,9 +191,15 @@ def test_pixels_of_two_cameras(project: Sample) -> None:
     assert found["2001", "P2"] == pytest.approx((10 * 0.008 - 20, 10 - 20 * 0.008), abs=NANOMETRE)
 
 
-def test_measured_marks_replace_the_origin(marked: Sample) -> None:
+def in_pixels(marked: Sample, *key: str) -> list[list[str]]:
+    """Say that the sample is in pixels, with other lines for the format of the camera; and give the rows of marks."""
     marked.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
-    marked.change("project.yaml", "    format: [230, 230]\n", "    pixel_size: 0.02\n")
+    marked.change("project.yaml", "    format: [230, 230]\n", *key or ("",))
+    return [row.split(",") for row in FIDUCIALS.splitlines()[1:]]
+
+
+def test_measured_marks_replace_the_origin(marked: Sample) -> None:
+    in_pixels(marked, "    pixel_size: 0.02\n")
     inputs = marked.load().inputs
     assert inputs.fiducials is not None
     assert inputs.fiducials.point_ids == ("F1", "F2")
@@ -223,33 +209,24 @@ def test_measured_marks_replace_the_origin(marked: Sample) -> None:
 
 
 def test_marks_tell_the_size_of_a_pixel(marked: Sample) -> None:
-    """A scanner's step: the marks lie 212 mm apart and 212 pixels; without it the key was asked for."""
-    marked.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
-    marked.change("project.yaml", "    format: [230, 230]\n", "")
-    table = (marked.folder / "fiducials.csv").read_text(encoding="utf-8").splitlines()
-    scanned = [
-        f"{photo},{mark},{50 * float(x)},{50 * float(y)}" for photo, mark, x, y in (r.split(",") for r in table[1:])
-    ]
-    marked.write("fiducials.csv", "\n".join([table[0], *scanned]))
+    """A scanner's step: the marks lie 212 mm apart and 212 pixels."""
+    rows = [f"{photo},{mark},{50 * float(x)},{50 * float(y)}" for photo, mark, x, y in in_pixels(marked)]
+    marked.write("fiducials.csv", "\n".join(["photo,mark,x,y", *rows]))
     loaded = marked.load()
-    (note,) = [note for note in loaded.hints if note.code == "pixel-size-derived"]
-    assert (
-        note.message == "camera RC30 has no pixel_size: a pixel is 20 µm by the calibrated fiducial marks of 4 photos"
-    )
+    note = notes(loaded)["pixel-size-derived"]
+    size = "a pixel is 20 µm by the calibrated fiducial marks of 4 photos"
+    assert note.message == f"camera RC30 has no pixel_size: {size}"
     assert (note.key, note.line) == ("cameras.RC30.pixel_size", 5)
-    inputs = loaded.inputs
-    assert inputs.fiducials is not None
-    np.testing.assert_allclose(inputs.fiducials.xy[0], [106.1, 106.0], rtol=1e-5)
-    np.testing.assert_allclose(inputs.observations.sigma, 0.5 * 0.02, rtol=1e-5)
+    assert loaded.inputs.fiducials is not None
+    np.testing.assert_allclose(loaded.inputs.fiducials.xy[0], [106.1, 106.0], rtol=1e-5)
+    np.testing.assert_allclose(loaded.inputs.observations.sigma, 0.5 * 0.02, rtol=1e-5)
 
 
 def test_marks_in_one_place_do_not_tell_it(marked: Sample) -> None:
-    marked.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
-    marked.change("project.yaml", "    format: [230, 230]\n", "")
-    table = (marked.folder / "fiducials.csv").read_text(encoding="utf-8").splitlines()
-    marked.write("fiducials.csv", "\n".join([table[0], *(",".join([*r.split(",")[:2], "7,7"]) for r in table[1:])]))
-    (line,) = marked.lines()
-    assert "cameras.RC30.pixel_size: the fiducial marks do not tell the size of a pixel" in line
+    rows = [f"{photo},{mark},7,7" for photo, mark, *_ in in_pixels(marked)]
+    marked.write("fiducials.csv", "\n".join(["photo,mark,x,y", *rows]))
+    message = "cameras.RC30.pixel_size: the fiducial marks do not tell the size of a pixel"
+    marked.tells("", message, alone=True)
 
 
 def test_marks_may_have_a_unit_of_their_own(marked: Sample) -> None:
@@ -259,9 +236,6 @@ def test_marks_may_have_a_unit_of_their_own(marked: Sample) -> None:
     assert fiducials is not None
     np.testing.assert_allclose(fiducials.xy[0], [0.1061, 0.106], rtol=1e-12)
     np.testing.assert_allclose(fiducials.sigma, 0.003, rtol=1e-12)
-
-
-# ------------------------------------------------------------------------------------------------- the ground
 
 
 @pytest.mark.parametrize(
@@ -288,16 +262,24 @@ def test_control_comes_in_the_order_of_its_axes(project: Sample, axes: str, row:
     assert control.sigma[0].tolist() == [given["east"], given["north"], given["up"]]
 
 
-def test_sigma_of_a_row_counts_before_that_of_the_list(project: Sample) -> None:
-    project.change("project.yaml", "[east, north, up]", "[north, east, up]")
-    project.write("control.csv", "point,x,y,z,sx,sy,sz\nG1,1,2,3,0.1,,0.3\n")
-    assert project.load().inputs.control.sigma.tolist() == [[0.06, 0.1, 0.3]]
-
-
-def test_without_a_sigma_of_the_list_only_used_coordinates_need_one(project: Sample) -> None:
-    project.change("project.yaml", "    sigma: [0.05, 0.06, 0.08]\n", "")
-    project.write("control.csv", "point,x,y,z,use,sx,sy,sz\nG1,1,2,3,xy,0.1,0.2,\n")
-    np.testing.assert_array_equal(project.load().inputs.control.sigma, [[0.1, 0.2, np.nan]])
+@pytest.mark.parametrize(
+    ("old", "new", "table", "expected"),
+    [
+        ("[east, north, up]", "[north, east, up]", "point,x,y,z,sx,sy,sz\nG1,1,2,3,0.1,,0.3\n", [0.06, 0.1, 0.3]),
+        (
+            "    sigma: [0.05, 0.06, 0.08]\n",
+            "",  # only coordinates that are used need one
+            "point,x,y,z,use,sx,sy,sz\nG1,1,2,3,xy,0.1,0.2,\n",
+            [0.1, 0.2, np.nan],
+        ),
+    ],
+)
+def test_sigma_of_a_row_counts_before_that_of_the_list(
+    project: Sample, old: str, new: str, table: str, expected: list[float]
+) -> None:
+    project.change("project.yaml", old, new)
+    project.write("control.csv", table)
+    np.testing.assert_array_equal(project.load().inputs.control.sigma, [expected])
 
 
 def test_each_control_list_has_its_frame(project: Sample) -> None:
@@ -338,26 +320,25 @@ def test_the_frame_of_the_results(project: Sample, said: str, expected: FrameSpe
     assert project.load().inputs.output == expected
 
 
-def test_curvature_of_eq_153_is_for_local_coordinates(project: Sample) -> None:
+@pytest.mark.parametrize(
+    ("keys", "radius"),
+    [
+        ("earth_radius: 6380000", 6_380_000),
+        # at a place: R = M N / (N cos² A + M sin² A), M and N of WGS 84 at 42.5 degrees
+        ("earth_latitude: 42.5\n  earth_azimuth: 90", 6_387_903.5),
+        ("earth_latitude: 42.5\n  earth_azimuth: 0", 6_364_587.2),
+        ("earth_latitude: 42.5", (6_387_903.5 * 6_364_587.2) ** 0.5),
+        ("earth_latitude: 425", "earth_latitude: 425 is out of range; expected -90 to 90 deg"),
+        ("earth_azimuth: 30", "at a latitude only; give `earth_latitude` as well"),
+    ],
+)
+def test_curvature_of_eq_153_is_for_local_coordinates(project: Sample, keys: str, radius: float | str) -> None:
     project.change("project.yaml", "EPSG:32633", "local")
-    project.change("project.yaml", "processing:", "processing:\n  earth_curvature: model\n  earth_radius: 6380000")
-    assert project.load().settings.absolute.earth_radius == 6_380_000
-    # at a place: R = M N / (N cos² A + M sin² A), M and N of WGS 84 at 42.5 degrees
-    project.change("project.yaml", "earth_radius: 6380000", "earth_latitude: 42.5\n  earth_azimuth: 90")
-    assert project.load().settings.absolute.earth_radius == pytest.approx(6_387_903.5, abs=0.1)
-    project.change("project.yaml", "earth_azimuth: 90", "earth_azimuth: 0")
-    assert project.load().settings.absolute.earth_radius == pytest.approx(6_364_587.2, abs=0.1)
-    project.change("project.yaml", "\n  earth_azimuth: 0", "")
-    assert project.load().settings.absolute.earth_radius == pytest.approx((6_387_903.5 * 6_364_587.2) ** 0.5, abs=0.1)
-    project.change("project.yaml", "earth_latitude: 42.5", "earth_latitude: 425")
-    with pytest.raises(InputError, match="earth_latitude: 425 is out of range; expected -90 to 90 deg"):
-        project.load()
-    project.change("project.yaml", "earth_latitude: 425", "earth_azimuth: 30")
-    with pytest.raises(InputError, match="at a latitude only; give `earth_latitude` as well"):
-        project.load()
-
-
-# -------------------------------------------------------------------------------------------------- what is noted
+    project.change("project.yaml", "processing:", f"processing:\n  earth_curvature: model\n  {keys}")
+    if isinstance(radius, str):
+        project.tells("", radius)
+    else:
+        assert project.load().settings.absolute.earth_radius == pytest.approx(radius, abs=0.1)
 
 
 def test_photos_in_no_strip(project: Sample) -> None:
@@ -383,32 +364,28 @@ def test_points_measured_once(project: Sample) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "measured"),
+    ("given", "measured", "alike"),
     [
-        ("GCP-7", "GCP7"),
-        ("gcp 07", "GCP-7"),
-        ("Р100", "P100"),
-        ("QO1", "Q01"),
-        ("qо1", "Q01"),
-        ("GCP7.", "GCP7"),
-        ("007", "7"),
+        ("GCP-7", "GCP7", True),
+        ("gcp 07", "GCP-7", True),
+        ("Р100", "P100", True),
+        ("QO1", "Q01", True),
+        ("qо1", "Q01", True),
+        ("GCP7.", "GCP7", True),
+        ("007", "7", True),
+        ("1006", "1005", False),
     ],
 )
-def test_control_never_measured_and_a_point_of_nearly_that_name(project: Sample, given: str, measured: str) -> None:
+def test_control_never_measured_and_a_point_of_nearly_that_name(
+    project: Sample, given: str, measured: str, alike: bool
+) -> None:
     project.write("observations.csv", OBSERVATIONS + f"1001,{measured},1,2\n1002,{measured},3,4\n")
     project.write("control.csv", CONTROL + f"{given},500100,4649871,212,xyz,\n")
     note = notes(project.load())["control-not-measured"]
     assert note.points == (given,)
-    assert f"`{given}`, did you mean `{measured}`?" in note.message
-    assert note.severity == "warning"
-
-
-def test_numbers_that_differ_are_not_alike(project: Sample) -> None:
-    project.write("observations.csv", OBSERVATIONS + "1001,1005,1,2\n1002,1005,3,4\n")
-    project.write("control.csv", CONTROL + "1006,500100,4649871,212,xyz,\n")
-    note = notes(project.load())["control-not-measured"]
-    assert "did you mean" not in note.message
-    assert note.severity == "note"
+    assert (f"`{given}`, did you mean `{measured}`?" in note.message) is alike
+    assert ("did you mean" in note.message) is alike
+    assert note.severity == ("warning" if alike else "note")
 
 
 def test_points_switched_off(project: Sample) -> None:
@@ -445,9 +422,6 @@ def test_blanks_around_ids_and_a_byte_order_mark(project: Sample) -> None:
         "observations.csv:1: begins with a byte order mark; it was skipped",
         "observations.csv:2: blanks around the id of a point removed in 1 row, here `P1 `",
     ]
-
-
-# ------------------------------------------------------------------------------------------------- forms of tables
 
 
 @pytest.mark.parametrize(

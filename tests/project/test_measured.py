@@ -13,8 +13,7 @@ from photostrip.points import PhotoPoints
 from photostrip.project.loading import Project, load_project
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec
-from tests.loops import nonempty
-from tests.project.samples import CONTROL, FIDUCIALS, FILES, MARKED_FILES, OBSERVATIONS, Sample, sample
+from tests.project.samples import CONTROL, FIDUCIALS, MARKED_FILES, OBSERVATIONS, Sample, sample
 
 PAIRS = """\
 pair,point,x,y,p,q
@@ -30,12 +29,20 @@ left,right,point,xl,yl,xr,yr
 2001,2002,P2,10,20,-80,20
 2001,2002,G1,30,40,-60,40
 """
-AGAIN = FILES["observations.csv"] + "1001,P1,10.504,-20.254\n1001,P1,10.508,-20.252\n"
+AVERAGE = "  unit: mm\n  repeated: average\n"
+AGAIN = OBSERVATIONS + "1001,P1,10.504,-20.254\n1001,P1,10.508,-20.252\n"
 
 
-@pytest.fixture
-def plain(tmp_path: Path) -> Sample:
-    return sample(tmp_path)
+HEADER, *ROWS = [line.split(",") for line in OBSERVATIONS.splitlines()]
+NUMBERED = "columns={photo: 1, point: 2, x: 3, y: 4}"
+
+
+def written(separator: str, *rows: list[str], decimal: str = ".") -> str:
+    return "".join(separator.join(cell.replace(".", decimal) for cell in row) + "\n" for row in rows)
+
+
+def in_columns(*rows: list[str]) -> str:
+    return "".join("  " + "".join(f"{cell:>12}" for cell in row) + "  \n" for row in rows)
 
 
 def measured(project: Project) -> dict[tuple[str, str], tuple[float, ...]]:
@@ -46,49 +53,45 @@ def measured(project: Project) -> dict[tuple[str, str], tuple[float, ...]]:
     }
 
 
-def told(plain: Sample) -> list[str]:
-    return [str(fault).replace(f"{plain.folder}/", "") for fault in plain.faults()]
-
-
-# ---------------------------------------------------------------------------------------------------- pairs
-
-
 @pytest.mark.parametrize("text", [PAIRS, BOTH, PAIRS.replace("-100", "/100"), PAIRS.replace("pair,", "Model,")])
-def test_a_list_of_pairs_is_the_table_of_its_photos(plain: Sample, text: str) -> None:
-    usual = measured(plain.load())
-    plain.write("observations.csv", text)
-    assert measured(plain.load()) == usual
+def test_a_list_of_pairs_is_the_table_of_its_photos(project: Sample, text: str) -> None:
+    usual = measured(project.load())
+    project.write("observations.csv", text)
+    assert measured(project.load()) == usual
 
 
-def test_the_photos_of_a_pair_may_have_dashes(plain: Sample) -> None:
-    usual = measured(plain.load())
-    for name in ("project.yaml", "observations.csv"):
-        plain.change(name, "1001", "10-01") if name == "project.yaml" else plain.write(name, PAIRS)
-    plain.write("observations.csv", PAIRS.replace("1001-1002", "10-01-1002"))
-    found = measured(plain.load())
+def test_the_photos_of_a_pair_may_have_dashes(project: Sample) -> None:
+    usual = measured(project.load())
+    project.change("project.yaml", "1001", "10-01")
+    project.write("observations.csv", PAIRS.replace("1001-1002", "10-01-1002"))
+    found = measured(project.load())
     assert {(photo.replace("10-01", "1001"), point) for photo, point in found} == set(usual)
 
 
-def test_a_pair_that_is_none_is_refused(plain: Sample) -> None:
-    plain.write("observations.csv", PAIRS.replace("2001-2002,P2", "2001_2003,P2"))
-    (line,) = told(plain)
-    assert line == (
-        "observations.csv:4:1: pair: pair 2001_2003 does not name two photos of the strips; expected a pair such as "
-        "1001-1002; write it as LEFT-RIGHT with ids of the strips' photos, or use two columns left and right"
-    )
-
-
-def test_a_pair_that_may_be_two_is_refused(plain: Sample) -> None:
-    plain.change("project.yaml", "[1001, 1002]", "[1, 1-1, 1-1-1]")
-    plain.write("observations.csv", PAIRS.replace("1001-1002", "1-1-1-1"))
-    assert "pair 1-1-1-1 may be photos 1 and 1-1-1 or 1-1 and 1-1 or 1-1-1 and 1" in told(plain)[0]
-
-
-def test_a_list_of_pairs_without_a_parallax_is_told_what_it_lacks(plain: Sample) -> None:
-    plain.write("observations.csv", PAIRS.replace("p,q", "p"))
-    assert told(plain)[0].startswith(
-        "observations.csv:1: q: there is no column `q`; expected a header `pair,point,x,y,p,q`"
-    )
+@pytest.mark.parametrize(
+    ("old", "new", "place", "words"),
+    [
+        (
+            "2001-2002,P2",
+            "2001_2003,P2",
+            "observations.csv:4:1: pair:",
+            "pair 2001_2003 does not name two photos of the",
+        ),
+        (
+            "1001-1002",
+            "1-1-1-1",
+            "observations.csv:2:1: pair:",
+            "may be photos 1 and 1-1-1 or 1-1 and 1-1 or 1-1-1 and 1",
+        ),
+        ("p,q", "p", "observations.csv:1: q:", "no column `q`; expected a header `pair,point,x,y,p,q`"),
+    ],
+)
+def test_a_list_of_pairs_that_is_wrong(project: Sample, old: str, new: str, place: str, words: str) -> None:
+    project.change("project.yaml", "1001, 1002", "1, 1-1, 1-1-1" if new == "1-1-1-1" else "1001, 1002")
+    project.write("observations.csv", PAIRS.replace(old, new))
+    first, *_ = project.lines()
+    assert first.startswith(place)
+    assert words in first
 
 
 @pytest.mark.slow
@@ -121,66 +124,53 @@ def test_a_strip_from_a_stereocomparator_is_that_of_its_photos(tmp_path: Path) -
     assert np.abs(apart).max() < 0.1
 
 
-# ------------------------------------------------------------------------------------------ measured again
-
-
-def test_points_measured_again_are_averaged_and_their_spread_told(plain: Sample) -> None:
-    plain.write("observations.csv", AGAIN)
-    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
-    project = plain.load()
-    x, y, sx, sy = measured(project)["1001", "P1"]
+def test_points_measured_again_are_averaged_and_their_spread_told(project: Sample) -> None:
+    project.write("observations.csv", AGAIN)
+    project.change("project.yaml", "  unit: mm\n", AVERAGE)
+    loaded = project.load()
+    x, y, sx, sy = measured(loaded)["1001", "P1"]
     assert [x, y] == pytest.approx([10.504, -20.252])
     assert [sx, sy] == pytest.approx([0.005 / np.sqrt(3)] * 2)
-    assert measured(project)["1001", "P2"] == (11.5, 20.25, 0.005, 0.005)
-    note = next(note for note in project.hints if note.code == "measurements-averaged")
+    assert measured(loaded)["1001", "P2"] == (11.5, 20.25, 0.005, 0.005)
+    note = next(note for note in loaded.hints if note.code == "measurements-averaged")
     assert "1 point measured up to 3 times" in note.message
     assert "scatters by 0.004 in x and 0.002 in y" in note.message
     assert "worst is point P1 on photo 1001, 0.004 off its mean" in note.message
 
 
-def test_the_mean_is_weighted(plain: Sample) -> None:
-    text = "photo,point,x,y,sx,sy\n" + "".join(f"{row},,\n" for row in FILES["observations.csv"].splitlines()[1:])
-    plain.write("observations.csv", text + "1001,P1,10.51,-20.25,0.01,0.01\n")
-    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
-    x, _, sx, _ = measured(plain.load())["1001", "P1"]
+def test_the_mean_is_weighted(project: Sample) -> None:
+    text = "photo,point,x,y,sx,sy\n" + "".join(f"{row},,\n" for row in OBSERVATIONS.splitlines()[1:])
+    project.write("observations.csv", text + "1001,P1,10.51,-20.25,0.01,0.01\n")
+    project.change("project.yaml", "  unit: mm\n", AVERAGE)
+    x, _, sx, _ = measured(project.load())["1001", "P1"]
     weights = np.array([1 / 0.005**2, 1 / 0.01**2])
     assert x == pytest.approx(weights @ [10.5, 10.51] / weights.sum())
     assert sx == pytest.approx(weights.sum() ** -0.5)
 
 
-def test_measurements_that_are_not_of_one_point_are_refused(plain: Sample) -> None:
-    plain.write("observations.csv", FILES["observations.csv"] + "1001,P1,10.5,-20.05\n")
-    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  repeated: average\n")
-    (line,) = told(plain)
-    assert line == (
-        "observations.csv:10:6: point: point P1 is measured 2 times on photo 1001 (lines 2, 10), up to 0.2 in y apart: "
-        "20 standard deviations from the mean; remove the wrong one, or give the other point an id of its own"
-    )
+def test_measurements_that_are_not_of_one_point_are_refused(project: Sample) -> None:
+    project.write("observations.csv", OBSERVATIONS + "1001,P1,10.5,-20.05\n")
+    project.change("project.yaml", "  unit: mm\n", AVERAGE)
+    message = "point P1 is measured 2 times on photo 1001 (lines 2, 10), up to 0.2 in y apart: 20 standard deviations"
+    fix = " from the mean; remove the wrong one, or give the other point an id of its own"
+    assert project.lines() == [f"observations.csv:10:6: point: {message}{fix}"]
 
 
-# ----------------------------------------------------------------------------------------- names and units
-
-
-def test_columns_may_have_other_names(plain: Sample) -> None:
-    usual = measured(plain.load())
-    text = FILES["observations.csv"].replace("photo,point,x,y", "Bild,Punkt,xs,ys")
-    plain.write("observations.csv", text)
-    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {photo: Bild, point: PUNKT, x: xs, y: ys}\n")
-    assert measured(plain.load()) == usual
-
-
-def test_a_declared_column_goes_before_its_usual_name(plain: Sample) -> None:
-    usual = measured(plain.load())
-    rows = FILES["observations.csv"].splitlines()
-    text = "\n".join(
-        [
-            "photo,point,x,y,x refined",
-            *(f"{row.rsplit(',', 2)[0]},0,{row.rsplit(',', 1)[1]},{row.split(',')[2]}" for row in rows[1:]),
-        ]
-    )
-    plain.write("observations.csv", text + "\n")
-    plain.change("project.yaml", "  unit: mm\n", "  unit: mm\n  columns: {x: x refined}\n")
-    assert measured(plain.load()) == usual
+@pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        (OBSERVATIONS.replace("photo,point,x,y", "Bild,Punkt,xs,ys"), "{photo: Bild, point: PUNKT, x: xs, y: ys}"),
+        # a declared column goes before the usual name
+        (
+            written(",", ["x", *HEADER[:2], "y", "x refined"], *(["0", *row[:2], row[3], row[2]] for row in ROWS)),
+            "{x: x refined}",
+        ),
+    ],
+)
+def test_columns_may_have_other_names(project: Sample, text: str, columns: str) -> None:
+    usual = measured(project.load())
+    project.write("observations.csv", text)
+    assert measured(project.load([f"observations.columns={columns}"])) == usual
 
 
 @pytest.mark.parametrize(
@@ -192,31 +182,18 @@ def test_a_declared_column_goes_before_its_usual_name(plain: Sample) -> None:
         ("{photo: }", ("project.yaml:19", "photo")),
     ],
 )
-def test_declared_columns_that_are_wrong(plain: Sample, columns: str, words: tuple[str, ...]) -> None:
-    plain.change("project.yaml", "  unit: mm\n", f"  unit: mm\n  columns: {columns}\n")
-    assert any(all(word in line for word in nonempty(words)) for line in told(plain)), told(plain)
+def test_declared_columns_that_are_wrong(project: Sample, columns: str, words: tuple[str, ...]) -> None:
+    project.change("project.yaml", "  unit: mm\n", f"  unit: mm\n  columns: {columns}\n")
+    project.tells(*words)
 
 
-def test_tenths_of_micrometres(plain: Sample) -> None:
-    usual = measured(plain.load())
-    rows = [row.split(",") for row in FILES["observations.csv"].splitlines()[1:]]
-    text = "photo,point,x,y\n" + "".join(f"{a},{b},{float(x) * 1e4:.0f},{float(y) * 1e4:.0f}\n" for a, b, x, y in rows)
-    plain.write("observations.csv", text)
-    plain.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n", "sigma: 0.005", "sigma: 50")
-    found = measured(plain.load())
+def test_tenths_of_micrometres(project: Sample) -> None:
+    usual = measured(project.load())
+    rows = ([*row[:2], *(f"{float(each) * 1e4:.0f}" for each in row[2:])] for row in ROWS)
+    project.write("observations.csv", written(",", HEADER, *rows))
+    project.change("project.yaml", "  unit: mm\n", "  unit: 0.1um\n", "sigma: 0.005", "sigma: 50")
+    found = measured(project.load())
     assert {key: pytest.approx(value) for key, value in usual.items()} == found
-
-
-HEADER, *ROWS = [line.split(",") for line in OBSERVATIONS.splitlines()]
-NUMBERED = "columns={photo: 1, point: 2, x: 3, y: 4}"
-
-
-def written(separator: str, *rows: list[str], decimal: str = ".") -> str:
-    return "".join(separator.join(cell.replace(".", decimal) for cell in row) + "\n" for row in rows)
-
-
-def in_columns(*rows: list[str]) -> str:
-    return "".join("  " + "".join(f"{cell:>12}" for cell in row) + "  \n" for row in rows)
 
 
 # a table of image coordinates, and what is said of it
@@ -307,9 +284,9 @@ def test_several_files_of_pairs_and_of_marks(tmp_path: Path) -> None:
     head, *rows = FIDUCIALS.splitlines(keepends=True)
     project.write("a.csv", head + "".join(rows[:3]))
     project.write("b.csv", head + "".join(rows[3:]))
-    pairs = "left,right,point,xl,yl,xr,yr\n"
-    project.write("c.csv", pairs + "1001,1002,P1,10.5,-20.25,-80.5,-20.5\n1001,1002,P2,11.5,20.25,-79.5,20.0\n")
-    project.write("d.csv", pairs + "2001,2002,P2,10,20,-80,20\n2001,2002,G1,30,40,-60,40\n")
+    head, *rows = BOTH.splitlines(keepends=True)
+    project.write("c.csv", head + "".join(rows[:2]))
+    project.write("d.csv", head + "".join(rows[2:]))
     one = plain.load().inputs
     found = project.load(["fiducial_measurements.file=[a.csv, b.csv]", "observations.file=[c.csv, d.csv]"]).inputs
     assert found.fiducials is not None
@@ -323,6 +300,7 @@ def test_several_files_of_pairs_and_of_marks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "said", "place", "words"),
     [
+        (BOTH, [], "b.csv:1: ", "holds points of pairs, but "),
         ("1001,P9,x,1\n", [], "b.csv:2:9: x:", "`x` is not a number"),
         ("1001,P1,1,1\n", [], "b.csv:2:6: point:", "already measured on photo 1001, in line 2 of "),
         ("1001,P1,50,1\n", ["observations.repeated=average"], "b.csv:2:6:", "(line 2 of "),
@@ -331,10 +309,8 @@ def test_several_files_of_pairs_and_of_marks(tmp_path: Path) -> None:
 def test_faults_of_several_files_have_their_own_place(
     project: Sample, rows: str, said: list[str], place: str, words: str
 ) -> None:
-    project.write("b.csv", "photo,point,x,y\n" + rows)
-    (line,) = project.lines(["observations.file=[observations.csv, b.csv]", *said])
-    assert line.startswith(place)
-    assert words in line
+    project.write("b.csv", rows if rows == BOTH else "photo,point,x,y\n" + rows)
+    project.tells(place, words, overrides=["observations.file=[observations.csv, b.csv]", *said], alone=True)
 
 
 @pytest.mark.parametrize(
@@ -373,9 +349,3 @@ def test_what_is_wrong_is_explained(
     assert first.startswith(place)
     assert words in first
     assert fix in first.partition(words)[2]
-
-
-def test_points_of_pairs_below_points_of_photos_are_refused(project: Sample) -> None:
-    project.write("b.csv", "left,right,point,xl,yl,xr,yr\n1001,1002,P7,1,2,3,4\n")
-    (line,) = project.lines(["observations.file=[observations.csv, b.csv]"])
-    assert line.startswith("b.csv:1: holds points of pairs, but ")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline.run import triangulate
+from photostrip.points import ModelPoints
 from photostrip.project.check import check_project
 from tests.loops import nonempty
 from tests.project.samples import sample
@@ -51,6 +52,31 @@ P, M, C = "project.yaml", "models.csv", "control.csv"
 CENTER_ROWS = [line for line in MODELS.splitlines() if line.split(",")[1] in CENTERS]
 
 
+REFUSED = "needs-image-coordinates"
+PLAIN_SIGMA, IMAGES = "  sigma: [0.01, 0.01, 0.02]\n", "observations: {file: a.csv, unit: mm, sigma: 1}\n"
+
+
+def said(*texts: str) -> dict[str, str]:
+    """The project with texts replaced, each by the one after it."""
+    text = PROJECT
+    for old, new in zip(texts[::2], texts[1::2], strict=True):
+        assert old in text
+        text = text.replace(old, new)
+    return {P: text}
+
+
+def listing(models: str) -> dict[str, str]:
+    """The project with the models of its strip listed."""
+    return said("photos: [1, 2, 3]", f"photos: [1, 2, 3]\n    models: {models}")
+
+
+def measured(folder: Path, files: dict[str, str] | None = None) -> ModelPoints:
+    """Load the project with some files in place of others."""
+    models = sample(folder, FILES | (files or {})).load().inputs.models
+    assert models is not None
+    return models.points
+
+
 def test_the_sample_is_right(tmp_path: Path) -> None:
     project = sample(tmp_path, FILES).load()
     assert project.inputs.models is not None
@@ -67,23 +93,19 @@ def test_the_sample_is_right(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "factor"), [("um", 1e-3), ("m", 1e3)])
 def test_units(tmp_path: Path, unit: str, factor: float) -> None:
-    found = sample(tmp_path, {**FILES, P: PROJECT.replace("unit: mm", f"unit: {unit}")}).load().inputs.models
-    plain = sample(tmp_path, FILES).load().inputs.models
-    assert found is not None
-    assert plain is not None
-    np.testing.assert_allclose(found.points.xyz, plain.points.xyz * factor, rtol=1e-12)
-    np.testing.assert_allclose(found.points.sigma, plain.points.sigma * factor, rtol=1e-12)
+    found, plain = measured(tmp_path, said("unit: mm", f"unit: {unit}")), measured(tmp_path)
+    np.testing.assert_allclose(found.xyz, plain.xyz * factor, rtol=1e-12)
+    np.testing.assert_allclose(found.sigma, plain.sigma * factor, rtol=1e-12)
 
 
 def test_covariances_become_correlations_in_the_axes_of_the_models(tmp_path: Path) -> None:
-    text = PROJECT.replace("  sigma: [0.01, 0.01, 0.02]\n", "  sigma: [0.01, 0.02, 0.03]\n  axes: left-handed\n")
+    project = said(PLAIN_SIGMA, "  sigma: [0.01, 0.02, 0.03]\n  axes: left-handed\n")
     lines = [line + ",0.01,0.02,0.03,0.0001,,-0.0003" for line in MODELS.splitlines()[1:]]
     header = "model,point,x,y,z,sx,sy,sz,cov_xy,cov_xz,cov_yz"
-    models = sample(tmp_path, {**FILES, P: text, M: "\n".join([header, *lines]) + "\n"}).load().inputs.models
-    assert models is not None
-    assert models.points.correlation is not None
+    found = measured(tmp_path, {**project, M: "\n".join([header, *lines]) + "\n"}).correlation
+    assert found is not None
     expected = [[1.0, -0.5, 0.0], [-0.5, 1.0, 0.5], [0.0, 0.5, 1.0]]  # y is turned over
-    np.testing.assert_allclose(models.points.correlation, np.tile(expected, (16, 1, 1)))
+    np.testing.assert_allclose(found, np.tile(expected, (16, 1, 1)))
 
 
 @pytest.mark.parametrize(
@@ -113,12 +135,9 @@ def test_centers_in_a_table_of_their_own(tmp_path: Path) -> None:
         "  unit: mm", "  centers: {file: centers.csv}\n  center_sigma: [0.03, 0.03, 0.04]\n  unit: mm"
     )
     centers = "\n".join(["model,photo,x,y,z", *CENTER_ROWS]) + "\n"
-    apart = sample(tmp_path, {**FILES, P: text, M: rest, "centers.csv": centers}).load().inputs.models
-    together = sample(tmp_path / "other", FILES).load().inputs.models
-    assert apart is not None
-    assert together is not None
-    assert sorted(apart.points.node.tolist()) == sorted(together.points.node.tolist())
-    assert apart.points.sigma[apart.points.node >= 9].tolist() == [[0.03, 0.03, 0.04]] * 4
+    apart = measured(tmp_path, {P: text, M: rest, "centers.csv": centers})
+    assert sorted(apart.node.tolist()) == sorted(measured(tmp_path / "other").node.tolist())
+    assert apart.sigma[apart.node >= 9].tolist() == [[0.03, 0.03, 0.04]] * 4
 
 
 def test_the_resolved_project_reads_as_the_same(tmp_path: Path) -> None:
@@ -133,9 +152,7 @@ def test_other_names_of_columns_and_rows_of_their_own(tmp_path: Path) -> None:
     )
     lines = table("model,Punkt,x,y,H").splitlines()
     own = [f"{lines[0]},sx,sy,sz", *(f"{line},0.01,0.02,0.03" for line in lines[1:])]
-    found = sample(tmp_path, {**FILES, P: text, M: "\n".join(own) + "\n"}).load().inputs.models
-    assert found is not None
-    assert found.points.sigma[3].tolist() == [0.01, 0.02, 0.03]
+    assert measured(tmp_path, {P: text, M: "\n".join(own) + "\n"}).sigma[3].tolist() == [0.01, 0.02, 0.03]
     told = check_project(tmp_path / P).document["model_sigma"]
     assert (told["rows_with_own"], told["rows_with_default"]) == (len(lines) - 1, 0)
 
@@ -149,12 +166,9 @@ def blocks() -> str:
 
 
 def test_a_file_of_blocks_is_the_same(tmp_path: Path) -> None:
-    given = sample(tmp_path, {**FILES, M: blocks()}).load().inputs.models
-    plain = sample(tmp_path / "plain", FILES).load().inputs.models
-    assert given is not None
-    assert plain is not None
-    assert given.points.xyz.tolist() == plain.points.xyz.tolist()
-    assert given.points.node.tolist() == plain.points.node.tolist()
+    given, plain = measured(tmp_path, {M: blocks()}), measured(tmp_path / "plain")
+    assert given.xyz.tolist() == plain.xyz.tolist()
+    assert given.node.tolist() == plain.node.tolist()
 
 
 def test_faults_of_blocks_have_their_line(tmp_path: Path) -> None:
@@ -163,26 +177,8 @@ def test_faults_of_blocks_have_their_line(tmp_path: Path) -> None:
     assert {fault.line for fault in faults} == {number for number, line in lines if line.startswith("B2  89")}
 
 
-def said(*texts: str) -> dict[str, str]:
-    """The project with texts replaced, each by the one after it."""
-    text = PROJECT
-    for old, new in zip(texts[::2], texts[1::2], strict=True):
-        assert old in text
-        text = text.replace(old, new)
-    return {P: text}
-
-
-def listing(models: str) -> dict[str, str]:
-    """The project with the models of its strip listed."""
-    return said("photos: [1, 2, 3]", f"photos: [1, 2, 3]\n    models: {models}")
-
-
 def without(*starts: str) -> str:
     return "\n".join(line for line in MODELS.splitlines() if not line.startswith(starts)) + "\n"
-
-
-REFUSED = "needs-image-coordinates"
-PLAIN_SIGMA, IMAGES = "  sigma: [0.01, 0.01, 0.02]\n", "observations: {file: a.csv, unit: mm, sigma: 1}\n"
 
 
 @pytest.mark.parametrize(

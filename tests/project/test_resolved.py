@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.project.samples import MARKED_FILES, Sample, sample
+from tests.project.samples import FILES, MARKED_FILES, Sample, sample
 
 EXPECTED = """\
 # A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.
@@ -105,47 +105,33 @@ VARIANTS: dict[str, list[tuple[str, str]]] = {
     ],
     "orthometric": [("height: ellipsoidal", "height: orthometric\n    geoid_undulation: 44")],
     "output": [("output:", "output:\n  crs: EPSG:4326\n  axes: [north, east, up]")],
+    "marks": [],
+    "marks of their own": [("{file: fiducials.csv}", "{file: fiducials.csv, unit: um, sigma: 3, y_axis: down}")],
     "no tolerances": [("tolerances: {check_rms_xy: 0.40}", "tolerances: {}")],
 }
-
-
-def same(first: Sample, second: Sample) -> None:
-    one, two = first.load(), second.load()
-    assert one.settings == two.settings
-    assert (one.inputs.name, one.inputs.strips, one.inputs.frames) == (
-        two.inputs.name,
-        two.inputs.strips,
-        two.inputs.frames,
-    )
-    assert one.inputs.output == two.inputs.output
-    for table in ("observations", "fiducials"):
-        a, b = getattr(one.inputs, table), getattr(two.inputs, table)
-        if a is not None:
-            np.testing.assert_array_equal(a.xy, b.xy)
-            np.testing.assert_array_equal(a.sigma, b.sigma)
-    np.testing.assert_array_equal(one.inputs.control.enu, two.inputs.control.enu)
-    assert one.resolved == two.resolved
 
 
 def test_the_text(tmp_path: Path) -> None:
     assert sample(tmp_path).load().resolved == EXPECTED
 
 
-@pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
-def test_it_is_the_same_project(tmp_path: Path, changes: list[tuple[str, str]]) -> None:
-    first, second = sample(tmp_path / "a"), sample(tmp_path / "b")
-    for old, new in changes:
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_it_is_the_same_project(tmp_path: Path, variant: str) -> None:
+    files = MARKED_FILES if variant.startswith("marks") else FILES
+    first, second = sample(tmp_path / "a", files), sample(tmp_path / "b", files)
+    for old, new in VARIANTS[variant]:
         first.change("project.yaml", old, new)
     second.write("project.yaml", first.load().resolved)
-    same(first, second)
-
-
-@pytest.mark.parametrize("unit", ["{file: fiducials.csv}", "{file: fiducials.csv, unit: um, sigma: 3, y_axis: down}"])
-def test_with_fiducial_marks(tmp_path: Path, unit: str) -> None:
-    first, second = sample(tmp_path / "a", MARKED_FILES), sample(tmp_path / "b", MARKED_FILES)
-    first.change("project.yaml", "{file: fiducials.csv}", unit)
-    second.write("project.yaml", first.load().resolved)
-    same(first, second)
+    one, two = first.load(), second.load()
+    assert (one.settings, one.resolved) == (two.settings, two.resolved)
+    for name in ("name", "strips", "frames", "output"):
+        assert getattr(one.inputs, name) == getattr(two.inputs, name)
+    np.testing.assert_array_equal(one.inputs.control.enu, two.inputs.control.enu)
+    for table in ("observations", "fiducials"):
+        a, b = getattr(one.inputs, table), getattr(two.inputs, table)
+        if a is not None:
+            np.testing.assert_array_equal(a.xy, b.xy)
+            np.testing.assert_array_equal(a.sigma, b.sigma)
 
 
 def test_presets_and_overrides_are_in_it(project: Sample) -> None:

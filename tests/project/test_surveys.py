@@ -46,9 +46,6 @@ def replaced(old: str, new: str) -> str:
     return text.replace(old, new, 1)
 
 
-# --------------------------------------------------------------------------------------------------------- meaning
-
-
 def test_a_project_says_what_was_simulated(tmp_path: Path) -> None:
     survey = load_survey(write(tmp_path))
     truth = TRUTH.measure(1)
@@ -169,9 +166,6 @@ def test_reference_coordinates_may_stand_once(tmp_path: Path) -> None:
     np.testing.assert_allclose(survey.series.coordinates[:, 0, 0], [30.0, 30.35, 30.4])
 
 
-# --------------------------------------------------------------------------------------------------------- presets
-
-
 def test_the_cameras_of_the_source_are_there() -> None:
     known = known_presets()
     assert (known["Photheo 19/1318"].principal_distance, known["UMK 10/1318"].principal_distance) == (190.0, 100.0)
@@ -229,9 +223,6 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
     told = str(caught.value)
     for part in nonempty(expected):
         assert part in told
-
-
-# ---------------------------------------------------------------------------------------------------------- faults
 
 
 @pytest.mark.parametrize(

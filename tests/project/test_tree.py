@@ -67,14 +67,6 @@ def test_values_know_their_place(path: tuple[str | int, ...], line: int, column:
 
 
 @pytest.mark.usefixtures("_loader")
-def test_keys_know_their_place() -> None:
-    root, _ = read(TEXT)
-    assert root is not None
-    assert root.keys["empty"] == Place("f.yaml", 7, 1)
-    assert root.entries["after"].keys["y"].line == 9
-
-
-@pytest.mark.usefixtures("_loader")
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
@@ -86,6 +78,9 @@ def test_keys_know_their_place() -> None:
         ("a: &b\n  c: *b", 1, "stands for the value itself"),
         ("a: 1\n' a ': 2", 2, "second time"),
         ("a: 1\n...\n---\nb: 1", 3, "second document"),
+        ("a: {b: {c: [" + "[" * 30 + "]" * 31 + "}}", 1, "nested"),
+        ("x: 1\ny:\n  [", 3, ""),
+        ("[", 1, ""),
         ("a: " + "[" * 2000 + "]" * 2000, 1, "nested"),
         ("a: &x 1\nb: &x 2", 2, "the same &"),
         ("a: \ufffe", 1, "U+FFFE"),
@@ -130,19 +125,6 @@ def test_a_fault_below_what_exists_stands_at_what_exists() -> None:
     assert root is not None
     fault = fault_at(root, ("list", 1, "second", 9), "no such photo", "code", expected="ten", fix="add it")
     assert str(fault) == "f.yaml:6:13: list[1].second[9]: no such photo; expected ten; add it"
-
-
-@pytest.mark.usefixtures("_loader")
-def test_what_is_missed_after_the_last_line_is_told_at_its_begin() -> None:
-    _, findings = read("x: 1\ny:\n  [")
-    (fault,) = findings.faults
-    assert fault.line == 3
-
-
-def test_a_bracket_at_the_end_of_the_text_is_told_with_its_column() -> None:
-    _, findings = read("[")
-    (fault,) = findings.faults
-    assert (fault.line, fault.column) == (1, 1)
 
 
 def test_an_alias_is_what_its_anchor_names() -> None:
