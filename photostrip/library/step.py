@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from photostrip import steps
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.steps import read_rays, read_step
+from photostrip.formats.steps import read_step
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.local_frame import geodetic_from_geocentric
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
@@ -65,8 +65,7 @@ def step(name: StepName, file: str, assignments: Sequence[str], *, trace: bool =
     given: Any = read_keys(kind, None, assignments)[0]
     if name == "chain":
         head = f"photo; {given.angles.replace('-', ', ')}"
-    read = _rays(file) if head.startswith("photo; point") else read_step(file, head)
-    tables = [each for each in computed(given, *read) if trace or not each.key.startswith(TRACE)]
+    tables = [each for each in computed(given, *read_step(file, head)) if trace or not each.key.startswith(TRACE)]
     return Sheet(name, title, (), tables, main="points")
 
 
@@ -399,12 +398,6 @@ def _equations(words: str) -> Rows:
 
 def _turned(degrees: Sequence[float], system: str) -> Floats:
     return from_angles([radians(each) for each in degrees], system)
-
-
-def _rays(file: str) -> tuple[tuple[str, ...], tuple[str, ...], Rays]:
-    """Read image coordinates of all photos: ids of photos and points, and the rays."""
-    read = read_rays(file)
-    return read.photo_ids, read.target_ids, (read.photo, read.target, read.xy)
 
 
 def _fit(sigma0: float, unit: str, redundancy: int) -> list[tuple[Any, ...]]:

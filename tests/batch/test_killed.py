@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -116,18 +117,8 @@ def test_whole_commands_killed_with_their_workers(tmp_path: Path) -> None:
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
     for _ in range(WHOLE_RUNS):
         before = trusted(tmp_path / "out")
-        with started(
-            tmp_path,
-            "strips",
-            "-o",
-            "out",
-            "-j",
-            "2",
-            "--force",
-            mark=mark,
-            stdout=DEVNULL,
-            stderr=DEVNULL,
-        ) as process:
+        again = ("strips", "-o", "out", "-j", "2", "--force")
+        with started(tmp_path, *again, mark=mark, stdout=DEVNULL, stderr=DEVNULL) as process:
             time.sleep(draw.uniform(0.3 * duration, duration))
             process.kill()
         check_nothing_half(tmp_path / "out", whole)
@@ -160,8 +151,6 @@ def gone(mark: str) -> bool:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals) -> None:
     """As a terminal does on Ctrl-C: every process of the group gets the signal."""
-    import json
-
     write_projects(tmp_path / "strips", 40)
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
     with started(tmp_path, "strips", "-o", "out", "-j", "2", mark=mark, start_new_session=True) as process:

@@ -23,16 +23,8 @@ if TYPE_CHECKING:
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Give a folder with projects at many places, none of which is ever read."""
-    for name in (
-        "north/s1/project.yaml",
-        "north/s2/project.yaml",
-        "south/s1/project.yaml",
-        "south/s3/old/project.yaml",
-        "south/.git/project.yaml",
-        "flat/a.yaml",
-        "flat/b.yml",
-        "flat/notes.txt",
-    ):
+    folders = ("north/s1", "north/s2", "south/s1", "south/s3/old", "south/.git")
+    for name in (*(f"{each}/project.yaml" for each in folders), "flat/a.yaml", "flat/b.yml", "flat/notes.txt"):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("", encoding="utf-8")
@@ -68,11 +60,8 @@ def test_a_list_is_relative_to_itself(here: Path, monkeypatch: pytest.MonkeyPatc
     (here / "lists").mkdir()
     (here / "lists" / "mine.txt").write_text("# two\n../north\n\n  ../flat/a.yaml  \r\n", encoding="utf-8")
     found = [project for project, _ in chosen("@lists/mine.txt")]
-    assert [os.path.normpath(each) for each in found] == [
-        "north/s1/project.yaml",
-        "north/s2/project.yaml",
-        "flat/a.yaml",
-    ]
+    expected = ["north/s1/project.yaml", "north/s2/project.yaml", "flat/a.yaml"]
+    assert [os.path.normpath(each) for each in found] == expected
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"north/s2\n")))
     assert chosen("@-") == [("north/s2/project.yaml", "s2")]
 

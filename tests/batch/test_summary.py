@@ -27,18 +27,11 @@ if TYPE_CHECKING:
 
 
 def good(**changes: Any) -> dict[str, Any]:  # noqa: ANN401 (any value of a line)
-    numbers = {
-        "strips": 1, "photos": 20, "points": 174, "rejected": 2, "sigma0_um": 4.8, "rms_at": "check",
-        "rms_plan_m": 0.163, "rms_height_m": None,
-    }  # fmt: skip
     return {
-        "status": "good",
-        "exit_code": 0,
-        "adjustment": "polynomial",
-        **numbers,
-        "messages": [],
-        "findings": [],
-    } | changes
+        "status": "good", "exit_code": 0, "adjustment": "polynomial", "strips": 1, "photos": 20, "points": 174,
+        "rejected": 2, "sigma0_um": 4.8, "rms_at": "check", "rms_plan_m": 0.163, "rms_height_m": None,
+        "messages": [], "findings": [],
+    } | changes  # fmt: skip
 
 
 def lines(*outcomes: dict[str, Any]) -> list[dict[str, Any]]:

@@ -17,11 +17,12 @@ from photostrip.errors import InputError
 from photostrip.formats import files
 from photostrip.formats.files import write_files
 from tests.batch.projects import run, tree
+from tests.calls import words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from tests.calls import Capture
+    from tests.calls import Call
 
 PROJECTS = 5
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
@@ -53,28 +54,25 @@ def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
 
 @pytest.mark.slow
 def test_a_disk_that_is_full_for_a_while_costs_those_projects_only(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+    here: Path, monkeypatch: pytest.MonkeyPatch, call: Call
 ) -> None:
     with monkeypatch.context() as patch:
         full(patch, "out/s2/")
-        assert main(["batch", "strips", "-o", "out"]) == 2
-    out = capsys.readouterr().out
-    assert "5 projects: 1 unwritten, 4 good" in out
+        code, out, _ = call("batch", "strips", "-o", "out")
+    assert (code, "5 projects: 1 unwritten, 4 good" in out) == (2, True)
     assert "out/s2: the result cannot be written: no space left on device" in out
     assert list((here / "out" / "s2").iterdir()) == []
-    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
-    assert main(["batch", "strips", "-o", "whole", "-q"]) == 0
+    assert main(["batch", "strips", "-o", "out", "-q"]) == main(["batch", "strips", "-o", "whole", "-q"]) == 0
     assert tree(here / "out") == tree(here / "whole")
 
 
 @pytest.mark.slow
-def test_a_disk_that_stays_full_ends_the_batch(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+def test_a_disk_that_stays_full_ends_the_batch(here: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
     full(monkeypatch, "out/")
-    assert main(["batch", "strips", "-o", "out"]) == 2
-    captured = capsys.readouterr()
-    assert "5 projects: 3 unwritten, 2 not run" in captured.out  # the summary is told even where it cannot be written
-    assert "error: 3 results in a row could not be written; 2 projects not run" in captured.err
-    assert "no space left on device" in captured.err
+    code, out, err = call("batch", "strips", "-o", "out")
+    assert (code, "5 projects: 3 unwritten, 2 not run" in out) == (2, True)  # told even where it cannot be written
+    assert "error: 3 results in a row could not be written; 2 projects not run" in err
+    assert "no space left on device" in err
     assert [path for path in (here / "out").rglob("*") if path.is_file()] == [here / "out" / ".batch.lock"]
 
 
@@ -88,16 +86,15 @@ def test_an_earlier_result_survives_a_full_disk(here: Path, monkeypatch: pytest.
 
 
 @pytest.mark.slow
-def test_a_result_replaces_no_file_of_its_project(here: Path, capsys: Capture) -> None:
+def test_a_result_replaces_no_file_of_its_project(here: Path, call: Call) -> None:
     first = here / "strips" / "s1"
     (first / "control.csv").rename(first / "points.csv")
     project = first / "project.yaml"
     project.write_text(project.read_text(encoding="utf-8").replace("control.csv", "points.csv"), encoding="utf-8")
     before = tree(first)
-    assert main(["batch", "strips", "-o", "strips"]) == 2
-    out = capsys.readouterr().out
-    assert "5 projects: 1 unwritten, 4 good" in out
-    assert "s1/points.csv: was read, and what is written would replace it" in " ".join(out.split())
+    code, out, _ = call("batch", "strips", "-o", "strips")
+    assert (code, "5 projects: 1 unwritten, 4 good" in out) == (2, True)
+    assert "s1/points.csv: was read, and what is written would replace it" in words(out)
     assert tree(first) == before
 
 
@@ -105,9 +102,7 @@ def test_a_result_replaces_no_file_of_its_project(here: Path, capsys: Capture) -
 def test_an_output_that_must_not_be_written_to_is_refused_at_once(here: Path) -> None:
     (here / "out").mkdir(mode=0o555)
     done = batch(here, "strips", "-o", "out")
-    assert done.returncode == 2
-    assert done.stderr == "error: out/.batch.lock: Permission denied\n"
-    assert done.stdout == ""
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "error: out/.batch.lock: Permission denied\n")
 
 
 @pytest.mark.slow
@@ -128,24 +123,18 @@ def test_inputs_that_may_not_be_read_in_the_middle(here: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: Capture) -> None:
-    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+def test_a_second_batch_on_the_same_folder_is_refused(here: Path, call: Call) -> None:
+    batch = ("batch", "strips", "-o", "out", "-q")
+    assert call(*batch)[0] == 0
     before = tree(here / "out")
-    capsys.readouterr()
     with opened(Path("elsewhere")):
-        assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+        assert call(*batch)[0] == 0
     with opened(Path("out")) as folder:
+        assert not list((here / "out").glob("summary.*"))  # it would not be true
         write_files(folder.path, {name: content.decode() for name, content in before.items() if "/" not in name})
-        assert main(["batch", "strips", "-o", "out"]) == 2
+        code, _, err = call(*batch)
         assert tree(here / "out") == before  # nothing touched, the summary of the first one neither
-    assert "error: out: another batch is writing into this folder" in capsys.readouterr().err
-    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
-
-
-@pytest.mark.slow
-def test_a_summary_that_would_not_be_true_is_removed(here: Path) -> None:
-    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
-    with opened(here / "out"):
-        assert not list((here / "out").glob("summary.*"))
+    assert (code, "error: out: another batch is writing into this folder" in err) == (2, True)
+    assert call(*batch)[0] == 0
     with pytest.raises(InputError), opened(here / "strips" / "s1" / "project.yaml"):
         pass

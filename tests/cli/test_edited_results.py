@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from tests.calls import Call, Capture
+    from tests.calls import Answer, Call
 
 ESCAPE = "\x1b[2J\x1b]0;title\x07\x9b31m\u202egnp\x7f"
 TOO_LONG = "@digits@"  # stands for a number that Python itself does not read
@@ -102,18 +102,13 @@ def faults_of(edit: Edited, right: Path, folder: Path, command: Sequence[str]) -
 COMMANDS = (
     ("report", "EDITED"),
     ("report", "EDITED", "--verbose", "--format", "md"),
-    ("report", "EDITED", "--format", "json"),
-    ("report", "EDITED", "--format", "github"),
+    *(("report", "EDITED", "--format", form) for form in ("json", "github")),
     ("report", "EDITED", "--output", "PAGE"),
     ("compare", "EDITED", "RIGHT"),
     ("compare", "RIGHT", "EDITED"),
-    ("compare", "EDITED", "RIGHT", "--format", "junit"),
-    ("compare", "EDITED", "RIGHT", "--format", "json"),
-    ("compare", "EDITED", "RIGHT", "--format", "github"),
-    ("convert", "EDITED", "OUT", "--to", "geopackage"),
-    ("convert", "EDITED", "OUT", "--to", "orthority"),
+    *(("compare", "EDITED", "RIGHT", "--format", form) for form in ("junit", "json", "github")),
+    *(("convert", "EDITED", "OUT", "--to", program) for program in ("geopackage", "orthority", "cameras")),
     ("convert", "EDITED", "OUT", "--to", "colmap", "--force"),
-    ("convert", "EDITED", "OUT", "--to", "cameras"),
 )
 
 
@@ -175,17 +170,14 @@ def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: 
     assert words in str(fault)
 
 
-@pytest.mark.parametrize(("command", "key"), [("report", "models.left"), ("compare", "models.left")])
-def test_a_missing_key_is_told_with_all_that_lead_to_it(
-    command: str, key: str, tmp_path: Path, capsys: Capture
-) -> None:
+@pytest.mark.parametrize("more", [["report"], ["compare", str(RESULT)]])
+def test_a_missing_key_is_told_with_all_that_lead_to_it(more: list[str], tmp_path: Path, call: Call) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
-    block, column = key.split(".")
-    del document[block][column]
+    del document["models"]["left"]
     file = tmp_path / "result.json"
     file.write_text(to_json(document), encoding="utf-8")
-    assert main([command, str(file), *([str(RESULT)] if command == "compare" else [])]) == 2
-    assert f"{key}: is missing" in capsys.readouterr().err
+    code, _, err = call(more[0], file, *more[1:])
+    assert (code, "models.left: is missing" in err) == (2, True)
 
 
 @pytest.mark.parametrize("options", [["report"], ["statement"], ["compare", str(RESULT)], ["compare", "--again"]])
@@ -213,7 +205,7 @@ def test_what_is_no_result_is_refused(
     assert words in err
 
 
-def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: Capture) -> None:
+def test_control_characters_are_shown_and_never_sent(tmp_path: Path, answer: Answer) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
     document["name"] += ESCAPE
     document["control"]["id"][0] = ESCAPE
@@ -221,14 +213,11 @@ def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: Cap
     file.write_text(to_json(document), encoding="utf-8")
     assert read_result(str(file))["control"][0]["id"] == ESCAPE
     for form in ("text", "md", "github", "json"):
-        assert main(["report", str(file), "--format", form]) == 0
-        out = capsys.readouterr().out
+        out = answer("report", file, "--format", form)
         assert not {"\x1b", "\x07", "\x9b", "\x7f", "\u202e"} & set(out)
         assert form == "github" or ("\\u001b[2J" if form == "json" else "x1b") in out
 
 
-def test_what_the_user_types_is_shown_too(capsys: Capture) -> None:
-    assert main(["run", "no\x1b[31m.yaml"]) == 2
-    err = capsys.readouterr().err
-    assert "\x1b" not in err
-    assert "no\\x1b[31m.yaml" in err
+def test_what_the_user_types_is_shown_too(call: Call) -> None:
+    code, _, err = call("run", "no\x1b[31m.yaml")
+    assert (code, "\x1b" in err, "no\\x1b[31m.yaml" in err) == (2, False, True)

@@ -14,6 +14,7 @@ from photostrip.cli.main import main
 from photostrip.formats.result_json import read_result
 from photostrip.simulation.spec import Points
 from photostrip.visible import visible
+from tests import calls
 from tests.loops import nonempty
 from tests.project.test_ids import ODD
 from tests.results import spec, write_project
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
     from tests.calls import Capture
 
+    Both = tuple[Path, Path, dict[str, str], dict[str, str]]
+
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 PHOTOS = ["0123", "NO", "1:20", "1e3", "~"]
@@ -30,7 +33,7 @@ NAMES = ["Камера", "+7", "-1"]  # camera, strip, project
 
 
 def rows(path: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+    return calls.rows(path.read_text(encoding="utf-8"))
 
 
 def renamed(folder: Path, target: Path) -> tuple[dict[str, str], dict[str, str]]:
@@ -59,7 +62,7 @@ def renamed(folder: Path, target: Path) -> tuple[dict[str, str], dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str, str], dict[str, str]]:
+def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
     """Run the project with plain and with odd ids."""
     base = tmp_path_factory.mktemp("ids")
     path = write_project(base / "plain", replace(spec(), points=Points(extra_per_model=12)))
@@ -69,9 +72,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str
     return base / "plain-result", base / "odd-result", photos, points
 
 
-def test_the_result_has_the_same_numbers_under_the_new_ids(
-    both: tuple[Path, Path, dict[str, str], dict[str, str]],
-) -> None:
+def test_the_result_has_the_same_numbers_under_the_new_ids(both: Both) -> None:
     plain, odd, photos, points = both
     one, two = (read_result(str(each / "result.json")) for each in (plain, odd))
     assert [two["name"], two["strips"][0]["id"], two["cameras"][0]["id"]] == [NAMES[2], NAMES[1], NAMES[0]]
@@ -88,19 +89,14 @@ def test_the_result_has_the_same_numbers_under_the_new_ids(
 @pytest.mark.parametrize(
     ("table", "column"), [("points", "point"), ("photos", "photo"), ("residuals", "point"), ("residuals", "photo")]
 )
-def test_the_tables_of_the_result(
-    both: tuple[Path, Path, dict[str, str], dict[str, str]], table: str, column: str
-) -> None:
+def test_the_tables_of_the_result(both: Both, table: str, column: str) -> None:
     plain, odd, photos, points = both
     new = photos if column == "photo" else points
     before, after = (rows(each / f"{table}.csv") for each in (plain, odd))
     assert sorted(new[row[column]] for row in before) == sorted(row[column] for row in after)
 
 
-def test_the_resolved_project_runs_and_gives_the_same(
-    both: tuple[Path, Path, dict[str, str], dict[str, str]],
-    tmp_path: Path,
-) -> None:
+def test_the_resolved_project_runs_and_gives_the_same(both: Both, tmp_path: Path) -> None:
     odd = both[1]
     folder = odd.parent / "odd"
     resolved = folder / "resolved.yaml"
@@ -115,7 +111,7 @@ def test_the_resolved_project_runs_and_gives_the_same(
     assert hashes[0] == hashes[1]
 
 
-def test_the_report_shows_them(both: tuple[Path, Path, dict[str, str], dict[str, str]], capsys: Capture) -> None:
+def test_the_report_shows_them(both: Both, capsys: Capture) -> None:
     assert main(["report", str(both[1]), "--verbose", "--width", "200"]) == 0
     out = capsys.readouterr().out
     document = read_result(str(both[1] / "result.json"))
@@ -141,7 +137,7 @@ def test_of_ids_that_look_the_same_the_difference_is_told(
         text = (tmp_path / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace("G01,", f"{new},"), encoding="utf-8")
     main(["check", str(project)])
-    said = " ".join("".join(capsys.readouterr()).split())
+    said = calls.words("".join(capsys.readouterr()))
     assert f"`{given}`, did you mean `{measured}`?" in said
     assert words in said
     assert words or "looks the same" not in said

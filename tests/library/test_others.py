@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import photostrip
-from photostrip.cli.main import main
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tests.calls import Capture
+    from tests.calls import Answer
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
@@ -36,19 +35,15 @@ def test_a_result_against_its_baseline() -> None:
 
 
 def test_results_are_compared_as_mappings() -> None:
-    result, baseline = (
-        photostrip.read_result(FOLDER / "baseline.json"),
-        json.loads((FOLDER / "baseline.json").read_text(encoding="utf-8")),
-    )
-    assert repr(photostrip.compare(result, baseline)).endswith(
-        "of simulated-20 and the baseline agree within the tolerances.>"
-    )
+    file = FOLDER / "baseline.json"
+    result, baseline = photostrip.read_result(file), json.loads(file.read_text(encoding="utf-8"))
+    said = repr(photostrip.compare(result, baseline))
+    assert said.endswith("of simulated-20 and the baseline agree within the tolerances.>")
     assert photostrip.compare(baseline, result).same
     with pytest.raises(photostrip.InputError, match=r"^the baseline: has no key `photostrip_result`"):
         photostrip.compare(result, {"points": []})
-    with pytest.raises(
-        photostrip.InputError, match=r"compared with the baseline: the CRS is EPSG:32633; expected local"
-    ):
+    message = "compared with the baseline: the CRS is EPSG:32633; expected local"
+    with pytest.raises(photostrip.InputError, match=message):
         photostrip.compare(result, {**baseline, "frame": {**baseline["frame"], "crs": "local"}})
 
 
@@ -82,17 +77,12 @@ def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_plans_are_those_of_the_command(
-    kind: photostrip.planning.PlanKind,
-    overrides: dict[str, Any],
-    keys: list[str],
-    capsys: Capture,
+    kind: photostrip.planning.PlanKind, overrides: dict[str, Any], keys: list[str], answer: Answer
 ) -> None:
     found = photostrip.plan(kind, **overrides)
     options = [f"--set={key}" for key in keys]
-    assert main(["plan", kind, *options, "--format", "json"]) == 0
-    assert json.loads(capsys.readouterr().out) == found.document
-    assert main(["plan", kind, *options, "--format", "md"]) == 0
-    assert capsys.readouterr().out == found.report("md")
+    assert json.loads(answer("plan", kind, *options, "--format", "json")) == found.document
+    assert answer("plan", kind, *options, "--format", "md") == found.report("md")
 
 
 def test_a_plan_of_cameras_from_a_mapping() -> None:

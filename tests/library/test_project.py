@@ -37,7 +37,8 @@ def columns(text: str) -> dict[str, list[Any]]:
     }
 
 
-def in_memory(simulation: photostrip.Simulation) -> dict[str, Any]:
+@pytest.fixture
+def project(simulation: photostrip.Simulation) -> dict[str, Any]:
     """Give a simulated project as a mapping with its tables."""
     images, given = (columns(simulation.files[f"{file}.csv"]) for file in ("observations", "control"))
     return {
@@ -84,8 +85,7 @@ def test_a_fault_of_an_override_names_it_as_it_was_written(overrides: dict[str, 
     assert str(refused.value).startswith(message)
 
 
-def test_a_name_with_a_dot_is_one_key(simulation: photostrip.Simulation) -> None:
-    project = in_memory(simulation)
+def test_a_name_with_a_dot_is_one_key(project: dict[str, Any]) -> None:
     project["cameras"] = {"RC 30.1": project["cameras"]["film"]}
     project["strips"][0]["camera"] = "RC 30.1"
     found = photostrip.load(project, cameras={"RC 30.1": {"principal_distance": 152.9}})
@@ -93,8 +93,7 @@ def test_a_name_with_a_dot_is_one_key(simulation: photostrip.Simulation) -> None
 
 
 @pytest.mark.slow
-def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulation) -> None:
-    project = in_memory(simulation)
+def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulation, project: dict[str, Any]) -> None:
     found = photostrip.run(project)
     by_files = photostrip.run(simulation.project)
     assert len(found.points) == len(by_files.points) > 20
@@ -109,9 +108,8 @@ def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulat
 
 
 @pytest.mark.slow
-def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
+def test_data_frames_are_tables(project: dict[str, Any]) -> None:
     pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
-    project = in_memory(simulation)
     expected = photostrip.load(project).loaded.inputs.observations
     images = project["observations"].pop("file")
     for table in (pandas.DataFrame(images), pyarrow.table(images)):
@@ -169,9 +167,8 @@ def spoilt(value: object) -> Callable[[list[Any]], Any]:
     ],
 )  # fmt: skip
 def test_what_is_not_there_or_twice_is_found_as_in_files(
-    simulation: photostrip.Simulation, column: str, change: Callable[[list[Any]], Any], message: str
+    project: dict[str, Any], column: str, change: Callable[[list[Any]], Any], message: str
 ) -> None:
-    project = in_memory(simulation)
     images = project["observations"]["file"]
     project["observations"]["file"] = images | {column: change(images[column])}
     with pytest.raises(photostrip.InputError, match=re.escape(message)):
@@ -179,8 +176,7 @@ def test_what_is_not_there_or_twice_is_found_as_in_files(
 
 
 @pytest.mark.parametrize("table", [None, 7, np.zeros((3, 4))])
-def test_what_is_no_table_is_refused(simulation: photostrip.Simulation, table: object) -> None:
-    project = in_memory(simulation)
+def test_what_is_no_table_is_refused(project: dict[str, Any], table: object) -> None:
     project["observations"]["file"] = table
     with pytest.raises(
         photostrip.InputError, match=r"observations: (is a \w+, no table|has columns of different shapes)"
@@ -188,8 +184,7 @@ def test_what_is_no_table_is_refused(simulation: photostrip.Simulation, table: o
         photostrip.load(project)
 
 
-def test_texts_may_be_bytes(simulation: photostrip.Simulation) -> None:
-    project = in_memory(simulation)
+def test_texts_may_be_bytes(project: dict[str, Any]) -> None:
     images = project["observations"]["file"]
     expected = photostrip.load(project).loaded.inputs.observations.point_ids
     project["observations"]["file"] = images | {"point": np.array(images["point"]).astype("S12")}
@@ -209,8 +204,7 @@ def test_texts_may_be_bytes(simulation: photostrip.Simulation) -> None:
         (("name", None, float("nan")), "a project file cannot hold"),
     ],
 )
-def test_a_fault_names_its_key(simulation: photostrip.Simulation, change: tuple[str, Any, Any], message: str) -> None:
-    project = in_memory(simulation)
+def test_a_fault_names_its_key(project: dict[str, Any], change: tuple[str, Any, Any], message: str) -> None:
     block, key, value = change
     if key is None:
         project[block] = value
@@ -222,8 +216,7 @@ def test_a_fault_names_its_key(simulation: photostrip.Simulation, change: tuple[
     assert {fault.line for fault in refused.value.faults} == {0}
 
 
-def test_a_fault_of_a_table_names_its_row(simulation: photostrip.Simulation) -> None:
-    project = in_memory(simulation)
+def test_a_fault_of_a_table_names_its_row(project: dict[str, Any]) -> None:
     project["observations"]["file"]["x"][3] = "north"
     with pytest.raises(photostrip.InputError, match="observations:5"):
         photostrip.load(project)
@@ -252,8 +245,7 @@ def test_a_check_raises_nothing(tmp_path: Path) -> None:
         photostrip.load({"control": [{"crs": "local"}]}, control=[frame, frame])
 
 
-def test_a_refused_adjustment_carries_its_findings(simulation: photostrip.Simulation) -> None:
-    project = in_memory(simulation)
+def test_a_refused_adjustment_carries_its_findings(project: dict[str, Any]) -> None:
     given = project["control"][0]["file"]
     given["x"] = [-value for value in given["x"]]
     with pytest.raises((photostrip.InputError, photostrip.GeometryError)) as refused:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -14,17 +13,14 @@ from photostrip import steps
 from photostrip.camera import Camera, Distortion
 from photostrip.geometry.rotation import from_angles
 from photostrip.result.numbers import MATRIX
-from tests.loops import nonempty
+from tests.library.alone import F153, ON_GROUND, PAIR, axes, traced, values
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from tests.calls import Call
-
-    Document = dict[str, Any]
+    from tests.library.alone import Alone
 
 F = 153.0
 NOISE = {"image": {"sigma_um": 0}, "control": {"noise": [0, 0, 0]}}
@@ -83,14 +79,13 @@ def test_a_pair_is_oriented_as_it_was_flown(truth: Truth) -> None:
 def test_rays_meet_where_the_points_are(truth: Truth) -> None:
     ids = truth.common(0, 1)
     base = truth.centers[1] - truth.centers[0]
-    images = truth.image(0, ids), truth.image(1, ids)
-    found = steps.intersection(*images, F, base=base, rotations=(truth.rotations[0], truth.rotations[1]))
+    images, rotations = (truth.image(0, ids), truth.image(1, ids)), (truth.rotations[0], truth.rotations[1])
+    found = steps.intersection(*images, F, base=base, rotations=rotations)
     np.testing.assert_allclose(found.xyz + truth.centers[0], truth.xyz(ids), atol=1e-6)
     assert np.abs(found.gap).max() < 1e-6
     images[1][:, 1] += 0.1
     of_left, mean = (
-        steps.intersection(*images, F, base=base, rotations=(truth.rotations[0], truth.rotations[1]), left_ray=left_ray)
-        for left_ray in (True, False)
+        steps.intersection(*images, F, base=base, rotations=rotations, left_ray=each) for each in (True, False)
     )
     np.testing.assert_allclose(of_left.xyz[:, 1] - mean.xyz[:, 1], of_left.gap / 2)
     assert np.abs(of_left.gap).min() > 0.5
@@ -140,6 +135,7 @@ def test_a_strip_is_formed_at_once(truth: Truth, alone: Alone) -> None:
     assert [row["point"] for row in out["points"]] == [name for name, here in zip(ids, placed, strict=True) if here]
     np.testing.assert_allclose(axes(out["photos"], "xyz"), found.centers, atol=6e-5)
     assert out["values"][1] == {"name": "k 1-2", "value": pytest.approx(found.factors[1]), "unit": "", "sigma": None}
+    np.testing.assert_allclose(traced(out)["models"]["k"], found.factors)
     assert f"{found.factors[1]:.7f}" in alone.typed("strip", images, F153, "--trace")[1]
     code, _, err = alone.typed("strip", alone.write(["photo,point,x,y", *lines, lines[0]]), F153)
     assert (code, "is already measured on photo 0" in err) == (2, True)
@@ -234,11 +230,8 @@ def test_the_bundle_as_a_command(flown: Flown, alone: Alone) -> None:
     assert list(rows) == [name for name, here in zip(flown.ids, flown.placed, strict=True) if here]
     expected = np.hstack([found.points, found.sigmas, found.points - flown.given])[flown.placed]
     np.testing.assert_allclose(np.array(list(rows.values())), expected, atol=6e-5)
-    assert values(out) == {
-        "sigma0": pytest.approx(found.sigma0),
-        "redundancy": found.redundancy,
-        "iterations": found.iterations,
-    }
+    named = {name: getattr(found, name) for name in ("sigma0", "redundancy", "iterations")}
+    assert values(out) == pytest.approx(named)
     assert [row["photo"] for row in out["photos"]] == ["0", "1", "2"]
     tables, taken = traced(out), flown.placed[flown.point]
     left = np.column_stack([tables["rays"][axis] - tables["rays"][f"{axis}'"] for axis in "xy"])
@@ -334,69 +327,6 @@ def test_what_determines_nothing_is_refused(call: Callable[[], object], message:
 # --------------------------------------------------------------------------------------------------- as commands
 
 
-F153 = "principal_distance=153"
-PAIR = "point x_left y_left x_right y_right"
-ON_GROUND = "point x y z x_ground y_ground z_ground"
-
-
-class Alone:
-    """Steps as commands; what has an equals sign in it is a key that is set."""
-
-    def __init__(self, call: Call, folder: Path) -> None:
-        self.call, self.folder = call, folder
-
-    def write(self, lines: list[str], name: str = "points.csv") -> str:
-        """Write a table; give its path."""
-        (self.folder / name).write_text("\n".join(lines), encoding="utf-8")
-        return str(self.folder / name)
-
-    def table(
-        self,
-        head: str,
-        ids: Sequence[str],
-        *columns: Sequence[Sequence[float]] | NDArray[np.float64],
-        name: str = "points.csv",
-    ) -> str:
-        """Write a table of points with all digits; give its path."""
-        rows = np.hstack([np.asarray(each, float) for each in columns]).tolist()
-        lines = [",".join([first, *map(repr, row)]) for first, row in zip(ids, rows, strict=True)]
-        return self.write([head.replace(" ", ","), *lines], name)
-
-    def typed(self, *arguments: str) -> tuple[int, str, str]:
-        return self.call("step", *(f"--set={each}" if "=" in each else each for each in arguments))
-
-    def __call__(self, *arguments: str) -> Document:
-        """Take a step that must succeed; give its answer with its trace."""
-        code, out, err = self.typed(*arguments, "--trace", "--format", "json")
-        assert (code, err) == (0, "")
-        document: Document = json.loads(out)
-        return document
-
-
-@pytest.fixture
-def alone(call: Call, tmp_path: Path) -> Alone:
-    return Alone(call, tmp_path)
-
-
-def values(answer: Document) -> dict[str, float]:
-    return {each["name"]: each["value"] for each in answer["values"]}
-
-
-def axes(rows: list[Document], names: Sequence[str]) -> NDArray[np.float64]:
-    return np.array([[row[axis] for axis in names] for row in rows])
-
-
-def traced(answer: Document) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Give the tables of a trace: columns by name."""
-    return {
-        key.removeprefix("trace_"): {
-            name: np.array([row[name] for row in rows], float) for name in rows[0] if name != "id"
-        }
-        for key, rows in nonempty(answer.items())
-        if key.startswith("trace_")
-    }
-
-
 class Noisy(NamedTuple):
     """Common points of two photos, with noise."""
 
@@ -442,18 +372,16 @@ def test_intersection_as_a_command(noisy: Noisy, alone: Alone) -> None:
     np.testing.assert_allclose(axes(out["points"], "xyz"), met.xyz, atol=6e-5)
     np.testing.assert_allclose(points["Y1"] - points["Y2"], met.gap, atol=1e-9)
     left, right = left[:, ::-1], right[:, ::-1]  # the base along Y
-    points = traced(alone("intersection", alone.table(PAIR, noisy.ids, left, right), F153, "base=[10, 900, -20]"))[
-        "points"
-    ]
+    out = alone("intersection", alone.table(PAIR, noisy.ids, left, right), F153, "base=[10, 900, -20]")
+    points = traced(out)["points"]
     met = steps.intersection(left, right, F, base=[10, 900, -20], rotations=(np.eye(3), np.eye(3)), left_ray=True)
     np.testing.assert_allclose(points["X1"] - points["X2"], met.gap, atol=1e-9)
     np.testing.assert_allclose(points["N"] * points["y1h"], met.xyz[:, 1])
 
 
 def test_resection_as_a_command(noisy: Noisy, alone: Alone) -> None:
-    out = alone(
-        "resection", alone.table("point x y x_ground y_ground z_ground", noisy.ids, noisy.left, noisy.xyz), F153
-    )
+    table = alone.table("point x y x_ground y_ground z_ground", noisy.ids, noisy.left, noisy.xyz)
+    out = alone("resection", table, F153)
     tables, oriented = traced(out), steps.resection(noisy.left, noisy.xyz, F)
     assert [values(out)[axis] for axis in "xyz"] == pytest.approx(oriented.center.tolist(), abs=1e-4)
     before, added = tables["centre_before_each_step"], tables["what_the_step_adds"]
@@ -464,10 +392,8 @@ def test_resection_as_a_command(noisy: Noisy, alone: Alone) -> None:
 
 def test_absolute_orientation_and_scale_transfer_as_commands(noisy: Noisy, alone: Alone) -> None:
     model = steps.relative(noisy.left, noisy.right, F, base=920.0).model
-    out, fitted = (
-        alone("absolute", alone.table(ON_GROUND, noisy.ids, model, noisy.xyz)),
-        steps.absolute(model, noisy.xyz),
-    )
+    fitted = steps.absolute(model, noisy.xyz)
+    out = alone("absolute", alone.table(ON_GROUND, noisy.ids, model, noisy.xyz))
     assert values(out)["scale"] == pytest.approx(fitted.similarity.scale)
     rows = traced(out)["points"]
     np.testing.assert_allclose(rows["X'"] - rows["X-Xm"], fitted.residuals[:, 0], atol=1e-9)

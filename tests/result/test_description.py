@@ -271,12 +271,6 @@ def test_counts_are_whole_numbers(count: str, right: bool) -> None:
     assert ("counts.photos" not in refused(f'{{"counts": {{"photos": {count}}}}}')) is right
 
 
-def test_a_whole_result_has_every_block() -> None:
-    with pytest.raises(InputError) as caught:
-        read({"name": "a"}, "result.json")
-    assert {"version", "status", "verdict"} <= {fault.key for fault in caught.value.faults}
-
-
 @given(st.lists(st.text("ab-_. 0019\n\0é", max_size=6)))
 @example(["P10", "P2", "p2", "7", "07", "a-1", "a1", "a", ""])
 @example(["1" * 5000, "9", "line\nbreak", "P2"])

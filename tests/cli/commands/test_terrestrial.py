@@ -3,9 +3,7 @@
 # ruff: noqa: E501 (a message stands on one line, as the user reads it)
 from __future__ import annotations
 
-import csv
 import gzip
-import io
 import json
 import math
 import os
@@ -20,6 +18,7 @@ import pytest
 
 from photostrip.project import terrestrial as keys
 from photostrip.terrestrial.monitoring import monitor
+from tests.calls import rows, words
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.terrestrial.simulated import (
@@ -30,7 +29,6 @@ from tests.terrestrial.simulated import (
     coordinates,
     photo,
     project,
-    pseudo_parallaxes,
     write,
 )
 from tests.terrestrial.test_one_photo import CENTRE, PLACES, directions, from_the_theodolite
@@ -44,6 +42,7 @@ if TYPE_CHECKING:
     Answer = Callable[..., Any]
     Said = Callable[..., str]
 
+PAIRS, TURNED_PAIRS = ("xx", "xy", "xz", "zz"), ("yy", "xy", "yz", "zz")
 PHOTHEO, UMK = "camera=Photheo 19/1318", "camera=UMK 10/1318"
 
 
@@ -76,15 +75,6 @@ def answer(said: Said) -> Answer:
     return lambda *arguments: json.loads(said(*arguments, "--format", "json"))
 
 
-def rows(text: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(text)))
-
-
-def words(text: str) -> str:
-    """Give a text on one line, without the breaks of the page."""
-    return " ".join(text.split())
-
-
 # ------------------------------------------------------------------------------------------------------ directions
 
 
@@ -103,13 +93,9 @@ def test_directions_and_photo_are_inverse(tmp_path: Path, said: Said) -> None:
     np.testing.assert_allclose(np.array(back), np.array([[80.0, 60.0], [-70.5, 12.25], [0.0, 0.0]]), atol=1e-5)
 
 
-def test_directions_are_the_numbers_of_the_source(tmp_path: Path, answer: Answer) -> None:
+def test_keys_and_file_and_units_say_the_same(tmp_path: Path, answer: Answer) -> None:
     found = answer("directions", PHOTHEO, "at=[[80, 60]]", "sigma_um=5")
-    (point,) = found["points"]
-    assert point["lambda"] == pytest.approx(22.83365417791754, abs=1e-8)
-    assert point["beta"] == pytest.approx(16.227254023233513, abs=1e-8)
-    assert point["sigma_lambda_arcsec"] == pytest.approx(5.002661 * 206264.806 / 206265, abs=1e-5)
-    assert point["sigma_beta_arcsec"] == pytest.approx(4.803359 * 206264.806 / 206265, abs=1e-5)
+    assert found["points"][0]["beta"] == pytest.approx(16.227254023233513, abs=1e-8)  # more digits than are shown
     assert found["orientation"] == {"unit": "deg", "alpha": 0.0, "omega": 0.0, "kappa": 0.0}
     assert answer("directions", PHOTHEO, "at=[[80000, 60000]]", "unit=um", "sigma_um=5") == found
     file = tmp_path / "keys.yaml"
@@ -126,27 +112,15 @@ def test_accuracy_over_the_photo_in_every_form(said: Said, answer: Answer) -> No
     command = ("accuracy", UMK, "step=40")
     found = answer(*command)
     assert [(row["x"], row["z"]) for row in found["points"]] == [(x, z) for z in (0, 40, 60) for x in (0, 40, 80)]
-    corner = found["points"][-1]
-    assert corner["horizontal_arcsec"] == pytest.approx(5.6945, abs=1e-4)
-    assert corner["vertical_arcsec"] == pytest.approx(7.2926, abs=1e-4)
-    out = said(*command, "--format", "csv")
-    assert {key: float(value) for key, value in rows(out)[-1].items()} == corner
-    text = said(*command)
-    assert "needed everywhere   horizontal 5.69″, vertical 7.29″" in text
-    assert re.search(r"^ +60 +8\.84 +8\.37 +7\.29$", text, re.MULTILINE)
-    page = said(*command, "--format", "md")
-    assert "| 60 | 8.84 | 8.37 | 7.29 |" in page
-
-
-def test_accuracy_as_printed(said: Said, answer: Answer) -> None:
-    found = answer("accuracy", UMK, "step=40", "as_printed=true")
-    corner = found["points"][-1]
-    assert found["formulas"] == "as printed"
-    assert corner["vertical_arcsec"] == pytest.approx(8.1779, abs=1e-4)
-    assert corner["vertical_eq5_arcsec"] == pytest.approx(9.6846, abs=1e-4)
-    assert corner["vertical_exact_arcsec"] == pytest.approx(7.2926, abs=1e-4)
-    text = said("accuracy", UMK, "as_printed=true")
-    assert "inherit sec(lambda') from eq. 3, where cos(lambda') is right" in words(text)
+    assert {key: float(value) for key, value in rows(said(*command, "--format", "csv"))[-1].items()} == found["points"][
+        -1
+    ]
+    assert re.search(r"^ +60 +8\.84 +8\.37 +7\.29$", said(*command), re.MULTILINE)
+    assert "| 60 | 8.84 | 8.37 | 7.29 |" in said(*command, "--format", "md")
+    corner = answer(*command, "as_printed=true")["points"][-1]
+    sizes = [corner[f"{name}_arcsec"] for name in ("horizontal", "vertical", "vertical_eq5", "vertical_exact")]
+    assert sizes == pytest.approx([5.6945, 8.1779, 9.6846, 7.2926], abs=1e-4)
+    assert "inherit sec(lambda') from eq. 3, where cos(lambda') is right" in words(said(*command, "as_printed=true"))
 
 
 def test_a_tilted_camera_has_a_table_of_the_whole_photo(answer: Answer) -> None:
@@ -171,23 +145,13 @@ def test_rounds_of_every_theodolite_for_the_stricter_end_of_the_base(answer: Ans
     assert {row["theodolite"]: row["rounds"] for row in one["rounds"]}["T2"] == 2  # (2 / 1.896)^2 = 1.1
 
 
-def test_theodolite_of_two_seconds_in_four_rounds(said: Said, answer: Answer) -> None:
-    command = ("theodolite", UMK, "sigma_arcsec=2", "rounds=4")
-    found = answer(*command, "sigma_um=0.5")
-    assert found["theodolite"]["mean_horizontal_arcsec"] == 1.0
-    assert found["supported_um"]["by_horizontal"] == pytest.approx(0.878, abs=1e-3)
-    assert found["supported_um"]["by_vertical"] == pytest.approx(0.6856, abs=1e-3)
-    assert found["wanted"]["rounds_horizontal"] == 13  # (2 / 0.569)^2 = 12.3
-    assert found["wanted"]["rounds_vertical"] == 8  # (2 / 0.729)^2 = 7.5
-    text = said(*command, "vertical_arcsec=6")
+def test_a_theodolite_may_be_worse_in_height(said: Said) -> None:
+    text = said("theodolite", UMK, "sigma_arcsec=2", "rounds=4", "vertical_arcsec=6")
     assert "supports in the photo  2.06 µm everywhere (horizontal 0.88, vertical 2.06)" in text
 
 
 def test_a_theodolite_has_its_standard_error_in_its_name(answer: Answer) -> None:
     found = answer("theodolite", UMK, "theodolite=Theo 020")
-    assert found["theodolite"]["horizontal_arcsec"] == pytest.approx(
-        math.degrees(math.atan(0.020 / 1000)) * 3600, abs=1e-4
-    )
     assert found == answer("theodolite", UMK, f"sigma_arcsec={20e-6 * 206264.80624709636}")
 
 
@@ -245,9 +209,6 @@ def test_orient_reports_a_gross_error(tmp_path: Path, told: Call, said: Said) ->
         code, text, err = told(*held, f"screening={method}")
         assert (code, err) == (0, "")
         assert re.search(r"^P4 .* rejected$", text, re.MULTILINE)
-        assert re.search(
-            r"^- P4: lambda -?\d+\.\d″, beta -?\d+\.\d″ off the orientation without it", text, re.MULTILINE
-        )
     text = said(*held, "screening=none")
     assert "The scatter of the directions does not agree with the stated standard deviations." in text
     out = said(*held, "--format", "csv")
@@ -255,15 +216,13 @@ def test_orient_reports_a_gross_error(tmp_path: Path, told: Call, said: Said) ->
 
 
 def test_standard_deviations_of_the_rows_count(tmp_path: Path, answer: Answer) -> None:
-    plain, own = tmp_path / "plain.csv", tmp_path / "own.csv"
-    lines = sightings_csv().splitlines()
-    plain.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    own.write_text(
-        "\n".join([lines[0] + ",sx,sz,s_lambda,s_beta", *(line + ",0.01,0.01,4,4" for line in lines[1:])]) + "\n",
-        encoding="utf-8",
-    )
-    first = answer("orientation", f"table={plain}", *INTERIOR)
-    second = answer("orientation", f"table={own}", *INTERIOR)
+    table = tmp_path / "s.csv"
+    head, *lines = sightings_csv().splitlines()
+    table.write_text("\n".join([head, *lines]), encoding="utf-8")
+    first = answer("orientation", f"table={table}", *INTERIOR)
+    own = [f"{head},sx,sz,s_lambda,s_beta", *(f"{line},0.01,0.01,4,4" for line in lines)]
+    table.write_text("\n".join(own), encoding="utf-8")
+    second = answer("orientation", f"table={table}", *INTERIOR)
     for one, two in nonempty(zip(first["elements"], second["elements"], strict=True)):
         assert two["sigma"] == pytest.approx(2 * one["sigma"], rel=1e-3)
 
@@ -326,11 +285,11 @@ def test_correction_directions_from_both_ends_of_the_base_feed_the_displacements
     (tmp_path / "survey.yaml").write_text(text, encoding="utf-8")
     by_directions = answer("displacement", survey)
     first, second = (
-        [[row[name] for name in ("dx", "dy", "dz")] for row in found["displacements"]]
+        np.array([[row[name] for name in ("dx", "dy", "dz")] for row in found["displacements"]], float)
         for found in (by_angles, by_directions)
     )
     assert len(first) == 24
-    np.testing.assert_allclose(np.array(second, float), np.array(first, float), atol=2e-6)
+    np.testing.assert_allclose(second, first, atol=2e-6)
     (tmp_path / "survey.yaml").write_text(text.replace("left.csv", "left.csv, omega: 2"), encoding="utf-8")
     code, _, err = told("displacement", survey)
     assert (code, "`directions` gives the orientation of the photo, and `omega` another one" in words(err)) == (2, True)
@@ -355,12 +314,8 @@ def test_displacement_in_every_form(tmp_path: Path, told: Call, said: Said, answ
     table = rows(out)
     assert [(row["point"], row["epoch"]) for row in table[::12]] == [("P0", "epoch 1"), ("P0", "epoch 2")]
     assert float(table[12]["dx"]) == last[0]["dx"]
-    text = said("displacement", survey)
     for title in ("Cameras", "epoch 0 to epoch 1", "epoch 1 to epoch 2", "Rates", "Notes"):
-        assert f"── {title}" in text
-    assert re.search(r"^P11 .* moved$", text, re.MULTILINE)
-    page = said("displacement", survey, "--format", "md")
-    assert page.startswith("# Displacements: quarry\n")
+        assert f"## {title}" in said("displacement", survey, "--format", "md")
 
 
 def test_results_stand_in_the_order_of_the_axes(tmp_path: Path, answer: Answer) -> None:
@@ -374,14 +329,9 @@ def test_results_stand_in_the_order_of_the_axes(tmp_path: Path, answer: Answer) 
     for a, b in nonempty(zip(east["positions"], north["positions"], strict=True)):
         assert (a["x"], a["y"], a["z"]) == (b["y"], b["x"], b["z"])
     for c, d in nonempty(zip(east["displacements"], north["displacements"], strict=True)):
-        assert (c["dx"], c["sigma_y"], c["statistic"], c["ellipse_minor"]) == (
-            d["dy"],
-            d["sigma_x"],
-            d["statistic"],
-            d["ellipse_minor"],
-        )
-        for pair, turned in {"xx": "yy", "xy": "xy", "xz": "yz", "zz": "zz"}.items():
-            assert c[f"covariance_{pair}"] == d[f"covariance_{turned}"]
+        turned = {"dx": "dy", "sigma_y": "sigma_x", "statistic": "statistic", "ellipse_minor": "ellipse_minor"}
+        turned |= {f"covariance_{one}": f"covariance_{two}" for one, two in zip(PAIRS, TURNED_PAIRS, strict=True)}
+        assert [c[name] for name in turned] == [d[name] for name in turned.values()]
 
 
 @pytest.mark.slow
@@ -440,12 +390,6 @@ def test_a_table_of_coordinates_and_stable_points(tmp_path: Path, answer: Answer
     assert document["significant"] == 1
     (moved,) = [row for row in document["displacements"] if row["point"] == "4"]
     assert moved["dx"] == pytest.approx(20 * 0.4 / 40, abs=1e-6)
-
-
-def test_pseudo_parallaxes_of_a_project(tmp_path: Path, answer: Answer) -> None:
-    text = project().replace("coordinates: coordinates.csv", "pseudo_parallaxes: pseudo.csv")
-    survey = write(tmp_path, text, pseudo_parallaxes(), "pseudo.csv")
-    assert answer("displacement", survey, "measurements.sigma_d=0.00707")["turned_cameras"] == 1
 
 
 def test_a_point_without_a_displacement_has_a_reason_in_every_form(tmp_path: Path, said: Said, answer: Answer) -> None:
@@ -577,19 +521,15 @@ D,62,-30,0.0188,-0.0130,150,
 """
 
 
-def test_displacements_from_one_station(tmp_path: Path, told: Call, answer: Answer) -> None:
+def test_displacements_from_one_station(tmp_path: Path, answer: Answer) -> None:
     table = tmp_path / "changes.csv"
     table.write_text(CHANGES, encoding="utf-8")
     arguments = ("one-station", UMK, "stable=[A, B, C, D]", "sigma_um=3")
     found = answer(*arguments, f"table={table}")
     point = {each["point"]: each for each in found["points"]}
     assert [each["components"] for each in found["points"]] == [2, 2, 2, 2, 3, 2]
-    assert point["1"]["significant"]
     # 0.042 mm more than the turned camera moves it, at 110 m and f = 100 mm
     assert point["2"]["dx"] == pytest.approx(0.046, abs=0.002)
-    code, text, _ = told(*arguments, f"table={table}")
-    assert (code, "taken out" in text, "across the ray" in text) == (0, True, True)
-    assert rows(told(*arguments, f"table={table}", "--format", "csv")[1])[4]["point"] == "1"
     micro = tmp_path / "micro.csv"
     lines = [line.split(",") for line in CHANGES.splitlines()]
     scaled = [[row[0], *(f"{float(cell) * 1000:.6f}" for cell in row[1:5]), *row[5:]] for row in lines[1:]]
