@@ -149,10 +149,6 @@ def _used(used: Iterable[Any]) -> Filled:
     return Field("used", head=""), [Cell("" if each else "not used", bool(each)) for each in used]
 
 
-def _turned(rotations: Floats, factor: float) -> Floats:
-    return alpha_omega_kappa(rotations) * factor
-
-
 def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     """Give relative orientation of every pair: rounds of the iteration, rejections, parallaxes and model points."""
     photos, orientation, formed = strip.strip.photos, strip.of_photos.orientation, strip.of_photos.formed
@@ -174,7 +170,10 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
         yield table("pair_rejected", "", [*who, *taken(rejections, rejected)])
         yield from _largest(result, strip, number, who)
         base = bases[number] * formed.first.base
-        turns = [*np.array(base_angles(bases[number])) * factor, *_turned(rotations[number], factor).ravel()]
+        turns = [
+            *np.array(base_angles(bases[number])) * factor,
+            *(alpha_omega_kappa(rotations[number]) * factor).ravel(),
+        ]
         columns = [
             *who,
             (Field("sigma0_um", "um 2", "σ0"), orientation.sigma0[number] * 1000),
@@ -247,7 +246,7 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     columns = [
         photo,
         *filled(before, [[NOTHING] * len(before), *bases]),
-        *filled(fields(TURNS, f"{unit} 6", TURN_HEADS), _turned(formed.rotations, factor)),
+        *filled(fields(TURNS, f"{unit} 6", TURN_HEADS), alpha_omega_kappa(formed.rotations) * factor),
         *filled(fields("Xs Ys Zs", " 6"), formed.centers),
         *filled(hidden(*MATRIX, form=" 8"), turns),
     ]
@@ -302,7 +301,7 @@ def _absolute(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     before, squares, added = zip(*steps, strict=True)
     turns = hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1")
     states = [*before, similarity]
-    angles = _turned(np.array([each.rotation for each in states]), factor)
+    angles = alpha_omega_kappa(np.array([each.rotation for each in states])) * factor
     columns = [
         (Field("iteration", "count", "step"), [*range(1, len(steps) + 1), END]),
         (Field("[wvv]", " g6"), [*squares, NOTHING]),

@@ -78,13 +78,6 @@ def test_the_saved_result_has_the_keys_of_a_fresh_one() -> None:
 # ------------------------------------------------------------------------------------------------ from the file
 
 
-@pytest.mark.parametrize("key", ["strips", "models", "photos", "verdict", "status", "frame"])
-@pytest.mark.parametrize("value", [None, 1, "text", [{}]])
-def test_a_file_with_something_else_in_it_is_refused_in_words(key: str, value: object) -> None:
-    with pytest.raises(InputError, match=r"small: cannot be reported|result\.json: "):
-        reported(json.loads(to_json(saved() | {key: value})))
-
-
 @pytest.mark.parametrize("key", sorted(saved().keys() - {"polynomial_terms", "polynomial_evidence"}))
 def test_an_incomplete_file_is_refused_in_words(key: str) -> None:
     document = json.loads(to_json(case("projected").document))
