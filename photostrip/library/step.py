@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from photostrip import steps
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.steps import read_rays, read_step
+from photostrip.formats.steps import read_step
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.local_frame import geodetic_from_geocentric
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, from_angles
@@ -65,8 +65,7 @@ def step(name: StepName, file: str, assignments: Sequence[str], *, trace: bool =
     given: Any = read_keys(kind, None, assignments)[0]
     if name == "chain":
         head = f"photo; {given.angles.replace('-', ', ')}"
-    read = _rays(file) if head.startswith("photo; point") else read_step(file, head)
-    tables = [each for each in computed(given, *read) if trace or not each.key.startswith(TRACE)]
+    tables = [each for each in computed(given, *read_step(file, head)) if trace or not each.key.startswith(TRACE)]
     return Sheet(name, title, (), tables, main="points")
 
 
@@ -80,7 +79,7 @@ def _interior(given: keys.InteriorKeys, ids: list[str], measured: Floats, calibr
         if value
     ]
     yield _values(*terms, *_fit(found.sigma0 * MICROMETRES, "um", found.redundancy))
-    yield _points(ids, _image_residuals(found.residuals), of="mark")
+    yield _points(ids, ("vx vy", "um 2", found.residuals * MICROMETRES), of="mark")
     equations = [f"x' = {_linear(x)}", f"y' = {_linear(y)}"]
     if below != [0.0, 0.0, 0.0, 1.0]:
         equations = [f"{each.replace('= ', '= (')}) / ({_linear(below)})" for each in equations]
@@ -134,7 +133,8 @@ def _relative(given: keys.RelativeKeys, ids: list[str], left: Floats, right: Flo
 
 def _intersection(given: keys.IntersectionKeys, ids: list[str], one: Floats, other: Floats) -> Iterator[Rows]:
     focal, base, form = given.principal_distance, np.array(given.base), f"{given.unit} 4"
-    turned = _turned(given.left, given.angles), _turned(given.right, given.angles)
+    left, right = (from_angles(np.radians(each), given.angles) for each in (given.left, given.right))
+    turned = left, right
     found = steps.intersection(one, other, focal, base=base, rotations=turned, left_ray=given.left_ray)
     words = [
         f"N = (BX + x2h BZ/f) / (x1h - x2h), N2 = N + BZ/f, B = {', '.join(f'{each:g}' for each in base)}; eq. 138",
@@ -149,7 +149,7 @@ def _intersection(given: keys.IntersectionKeys, ids: list[str], one: Floats, oth
 
 
 def _chain(given: keys.TurnedKeys, ids: list[str], degrees: Floats) -> Iterator[Rows]:
-    rotations = np.array([_turned(each, given.angles) for each in degrees.tolist()])
+    rotations = np.array([from_angles(each, given.angles) for each in np.radians(degrees)])
     handed = steps.chain(rotations[1:], rotations[0])
     yield _values()
     yield _points(ids, _turns(handed, given.angles), of="photo")
@@ -222,7 +222,7 @@ def _resection(given: keys.ResectionKeys, ids: list[str], xy: Floats, ground: Fl
     found = steps.resection(xy, ground, focal, sigma=given.sigma_um / 1000.0)
     place = ("x; y; z", unit, found.center, np.sqrt(np.diag(found.covariance)[:3]))
     yield _values(place, _angles(found.rotation, given.angles), *_fit(found.sigma0, "", found.redundancy))
-    yield _points(ids, _image_residuals(found.residuals))
+    yield _points(ids, ("vx vy", "um 2", found.residuals * MICROMETRES))
     photo = np.zeros(len(xy), np.intp)
     seen: list[tuple[float, Floats, Floats]] = []
 
@@ -397,16 +397,6 @@ def _equations(words: str) -> Rows:
     return Rows(f"{TRACE}equations", "Equations", (), (), above=[words])
 
 
-def _turned(degrees: Sequence[float], system: str) -> Floats:
-    return from_angles([radians(each) for each in degrees], system)
-
-
-def _rays(file: str) -> tuple[tuple[str, ...], tuple[str, ...], Rays]:
-    """Read image coordinates of all photos: ids of photos and points, and the rays."""
-    read = read_rays(file)
-    return read.photo_ids, read.target_ids, (read.photo, read.target, read.xy)
-
-
 def _fit(sigma0: float, unit: str, redundancy: int) -> list[tuple[Any, ...]]:
     return [("sigma0", unit, sigma0), ("redundancy", "", redundancy)]
 
@@ -415,10 +405,6 @@ def _angles(rotation: Floats, system: str, textbook: str = "") -> tuple[Any, ...
     """Return the angles of a rotation; `textbook`: their names in the system of the source."""
     names = textbook if textbook and system == TEXTBOOK else system.replace("-", "; ")
     return names, "deg", np.degrees(angles(rotation, system))
-
-
-def _image_residuals(residuals: Floats) -> Columns:
-    return "vx vy", "um 2", residuals * MICROMETRES
 
 
 def _turns(rotations: Floats, system: str) -> Columns:

@@ -763,12 +763,11 @@ class CurvatureKeys(StepKeys):
         return float(radius_in_azimuth(np.radians(self.latitude), np.radians(self.azimuth), WGS84))
 
 
-class ClosedFormKeys(StepKeys):
+class ClosedFormKeys(FocalKeys):
     """Errors of points of an oriented model per error of each element, in closed form."""
 
     control: Words = key("Table of control, given in full: point, x, y from the left nadir, mm at photo scale")
     base: Positive = key("Photo base", unit="mm")
-    principal_distance: Positive = key("Principal distance", unit="mm")
     as_printed: Flag = key("With the misprints of the source", default=False)
 
 

@@ -136,19 +136,17 @@ def trace_sheet(result: Result) -> Sheet:
     departures = [] if result.model_strips else departures_of(result)
     tables = [symbols, Rows("departures", "Where this run departs from the textbook", columns, departures)]
     for strip in result.strips:
-        if not strip.is_of_models:
-            tables += [*_pairs(result, strip, unit), *_chain(strip, unit), *_scale_transfer(result, strip)]
-        tables += [*_absolute(result, strip, unit), *_polynomial(result, strip)]
+        formed = [] if strip.is_of_models else [*_pairs(result, strip, unit), *_chain(strip, unit)]
+        formed += [] if strip.is_of_models else _scale_transfer(result, strip)
+        for each in (*formed, *_absolute(result, strip, unit), *_polynomial(result, strip)):
+            with_strip = [*hidden("strip"), *each.fields]
+            tables.append(replace(each, fields=with_strip, rows=[(strip.strip.id, *row) for row in each.rows]))
     facts = [Fact("name", result.inputs.name), Fact("angles", unit), Fact("symbols", SYMBOLS)]
     return Sheet("trace", f"Trace: {result.inputs.name}", facts, tables, main="pair_points")
 
 
 def _used(used: Iterable[Any]) -> Filled:
     return Field("used", head=""), [Cell("" if each else "not used", bool(each)) for each in used]
-
-
-def _turned(rotations: Floats, factor: float) -> Floats:
-    return alpha_omega_kappa(rotations) * factor
 
 
 def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
@@ -158,7 +156,7 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     bases, rotations = orientation.relative
     for number, rounds in enumerate(pair_rounds(result, strip)):
         left, right = photos[number : number + 2]
-        who = same(strip=strip.strip.id, left=left, right=right)
+        who = same(left=left, right=right)
         for count, each in enumerate(rounds, 1):
             yield _round(who, each, count, unit, f"Relative orientation of {left} – {right}" if count == 1 else "")
         rejected = [each for each in strip.of_photos.rejections if orientation.pairs.pair[each.row] == number]
@@ -172,7 +170,10 @@ def _pairs(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
         yield table("pair_rejected", "", [*who, *taken(rejections, rejected)])
         yield from _largest(result, strip, number, who)
         base = bases[number] * formed.first.base
-        turns = [*np.array(base_angles(bases[number])) * factor, *_turned(rotations[number], factor).ravel()]
+        turns = [
+            *np.array(base_angles(bases[number])) * factor,
+            *(alpha_omega_kappa(rotations[number]) * factor).ravel(),
+        ]
         columns = [
             *who,
             (Field("sigma0_um", "um 2", "σ0"), orientation.sigma0[number] * 1000),
@@ -239,14 +240,13 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     formed, factor, photos = strip.of_photos.formed, PER_RADIAN[unit], strip.strip.photos
     directions = np.column_stack([formed.base_direction, formed.base_inclination]) * factor
     bases = np.column_stack([directions, np.diff(formed.centers, axis=0), formed.scale_factor])
-    who, photo = same(strip=strip.strip.id), (Field("photo"), list(photos))
+    photo = (Field("photo"), list(photos))
     places, turns = fields(" ".join(MATRIX), " 8"), formed.rotations.reshape(-1, 9)
     before = (*fields("tau nu", f"{unit} 6", "τ ν"), *fields("BX BY BZ", " 6"), Field("k", " 7"))
     columns = [
-        *who,
         photo,
         *filled(before, [[NOTHING] * len(before), *bases]),
-        *filled(fields(TURNS, f"{unit} 6", TURN_HEADS), _turned(formed.rotations, factor)),
+        *filled(fields(TURNS, f"{unit} 6", TURN_HEADS), alpha_omega_kappa(formed.rotations) * factor),
         *filled(fields("Xs Ys Zs", " 6"), formed.centers),
         *filled(hidden(*MATRIX, form=" 8"), turns),
     ]
@@ -256,7 +256,7 @@ def _chain(strip: StripResult, unit: str) -> Iterator[Rows]:
     frames = base_frames(formed.rotations[:-1], strip.of_photos.orientation.elements).reshape(-1, 9)
     pair = [(Field("left"), list(photos[:-1])), (Field("right"), list(photos[1:]))]
     note = "A_taunu = A(α1, ω1, κ1) A(α1′, 0, κ1′)ᵀ, base frame to strip, eq. 128, by rows; first column: the base."
-    yield table("base_frames", "", [*who, *pair, *filled(places, frames)], note=note)
+    yield table("base_frames", "", [*pair, *filled(places, frames)], note=note)
 
 
 def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:
@@ -265,7 +265,7 @@ def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:
     joined, form = formed.junctions, result.settings.formation.scale_transfer
     for number, factor in enumerate(joined.factor.tolist()):
         photo = strip.strip.photos[number + 1]
-        who, rows = same(strip=strip.strip.id, photo=photo), np.flatnonzero(joined.junction == number)
+        who, rows = same(photo=photo), np.flatnonzero(joined.junction == number)
         center = formed.centers[number + 1]
         before = np.linalg.norm(formed.model_xyz[joined.before[rows]] - center, axis=1)
         after = np.linalg.norm(formed.model_xyz[joined.after[rows]] - center, axis=1) / formed.scale_factor[number + 1]
@@ -286,41 +286,32 @@ def _scale_transfer(result: Result, strip: StripResult) -> Iterator[Rows]:
 
 def _absolute(result: Result, strip: StripResult, unit: str) -> Iterator[Rows]:
     similarity, frame, factor = strip.absolute.similarity, strip.intermediate, PER_RADIAN[unit]
-    points, who, sigma0 = strip.formed.xyz[strip.control_rows], same(strip=strip.strip.id), strip.absolute.sigma0
+    points, sigma0 = strip.formed.xyz[strip.control_rows], strip.absolute.sigma0
     moved = similarity(points)
     given = absolute_orientation.Targets(strip.control, result.frames, frame).of(moved)
-    facts = Facts(
-        (
-            ("A0", with_unit(frame.azimuth * factor, f"{unit} 6")),
-            ("origin, m", written(frame.origin, "m 4")),
-            ("M, by rows", "; ".join(written(row, " 9") for row in frame.axes)),
-        )
-    )
+    origin, axes = written(frame.origin, "m 4"), "; ".join(written(row, " 9") for row in frame.axes)
+    azimuth = with_unit(frame.azimuth * factor, f"{unit} 6")
+    facts = Facts((("A0", azimuth), ("origin, m", origin), ("M, by rows", axes)))
     keys = hidden("A0", "origin_x", "origin_y", "origin_z", *(f"M_{place}" for place in MATRIX), form=" 7")
     laid = filled(keys, [[frame.azimuth * factor, *frame.origin, *frame.axes.ravel()]])
-    columns = [*who, *laid, (Field("sigma0", " g4", shown=False), sigma0)]
+    columns = [*laid, (Field("sigma0", " g4", shown=False), sigma0)]
     yield table("absolute", f"Absolute orientation of strip {strip.strip.id}, eq. 142-149", columns, above=[facts])
     yield from _approximate(strip, points, given, similarity.scale)
     steps = similarity_steps(result, strip)
     before, squares, added = zip(*steps, strict=True)
-    states, turns = (
-        [*before, similarity],
-        hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1"),
-    )
+    turns = hidden("d_rotation_1", "d_rotation_2", "d_rotation_3", "d_scale", form="m e1")
+    states = [*before, similarity]
+    angles = alpha_omega_kappa(np.array([each.rotation for each in states])) * factor
     columns = [
-        *who,
         (Field("iteration", "count", "step"), [*range(1, len(steps) + 1), END]),
         (Field("[wvv]", " g6"), [*squares, NOTHING]),
         (Field("s", " 7"), [each.scale for each in states]),
-        *filled(
-            fields("xi eta theta", f"{unit} 6", "ξ η θ"), _turned(np.array([each.rotation for each in states]), factor)
-        ),
+        *filled(fields("xi eta theta", f"{unit} 6", "ξ η θ"), angles),
         *filled(fields("X0 Y0 Z0", "m 4"), [each.shift for each in states]),
         *filled((*fields("dX0 dY0 dZ0", "m e1", rank=1), *turns), [*added, [NOTHING] * 7]),
     ]
     yield table("similarity_steps", "", columns, note="no redundancy" if np.isnan(sigma0) else f"σ0 = {sigma0:.4g}")
     columns = [
-        *who,
         (Field("point"), list(strip.control.ids)),
         (Field("use"), ["".join(compress("xyz", use)) for use in strip.control.use]),
         *filled(fields("X Y Z", "strip 6"), points),
@@ -336,11 +327,10 @@ def _approximate(strip: StripResult, points: Floats, given: Floats, scale: float
     full = np.flatnonzero(strip.control.use.all(axis=1))
     if len(full) < 2:
         return
-    found, who = pair_scales(points[full], given[full]), same(strip=strip.strip.id)
+    found = pair_scales(points[full], given[full])
     ids, centroid = [strip.control.ids[row] for row in full.tolist()], points[full].mean(axis=0)
     few = slice(None) if len(full) <= PAIRED else slice(0)
     columns = [
-        *who,
         (Field("from"), [ids[row] for row in found.first[few]]),
         (Field("to"), [ids[row] for row in found.second[few]]),
         (Field("D", "strip 6"), found.source[few]),
@@ -348,13 +338,13 @@ def _approximate(strip: StripResult, points: Floats, given: Floats, scale: float
         (Field("r", " g9"), (found.target / found.source)[few]),
     ]
     yield table("control_distances", "", columns)
-    columns = [*who, *filled(fields("r t", " g9"), [(found.mean, scale / found.mean)])]
+    columns = [*filled(fields("r t", " g9"), [(found.mean, scale / found.mean)])]
     columns += filled(fields("centroid_x centroid_y centroid_z", " 6"), [centroid])
     yield table("approximate", "", columns, note="t = s/r; the centroid is that of the strip's control.")
 
 
 def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
-    found, who = strip.polynomial, same(strip=strip.strip.id)
+    found = strip.polynomial
     if found is None:
         return
     xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
@@ -368,7 +358,7 @@ def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
         Field("p", " g3"),
         Field("taken", head="", of=lambda each: Cell("taken" if each.accepted else "", bool(each.accepted))),
     )
-    tried = [*who, *same(found=found.degree), *taken(evidence, found.evidence)]
+    tried = [*same(found=found.degree), *taken(evidence, found.evidence)]
     yield table("polynomial_evidence", f"Polynomials of strip {strip.strip.id}, eq. 150-151", tried)
     terms = [
         (axis, *row, fit.sigma0)
@@ -376,11 +366,10 @@ def _polynomial(result: Result, strip: StripResult) -> Iterator[Rows]:
         for row in zip(fit.terms, fit.coefficients, fit.sigmas, strict=True)
     ]
     added = (Field("axis", head="added to"), Field("term"), Field("coefficient", " e8"), Field("sigma", " e2", "±"))
-    columns = [*who, *filled((*added, *hidden("sigma0", form="m 3")), terms)]
+    columns = [*filled((*added, *hidden("sigma0", form="m 3")), terms)]
     yield table("polynomial_terms", "", columns, above=[] if terms else ["No term is taken."])
     left = np.hstack([xyz[:, :2], given - xyz, corrected - given])
     columns = [
-        *who,
         (Field("point"), list(strip.control.ids)),
         *filled(fields("X Y lX lY lZ vX vY vZ", "m 3"), left),
     ]

@@ -32,16 +32,8 @@ def workflow() -> Any:  # noqa: ANN401 (any YAML)
     return yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))
 
 
-def test_the_workflow_installs_a_fixed_commit() -> None:
-    steps = workflow()["jobs"]["regress"]["steps"]
-    (install,) = [step for step in steps if "pip" in step.get("run", "")]
-    assert install["env"]["PHOTOSTRIP"].startswith("git+https://")
-    assert install["env"]["PHOTOSTRIP"].endswith("@COMMIT")
-    assert install["run"] == 'python -m pip install "photostrip @ $PHOTOSTRIP"'
-
-
 @pytest.mark.slow
-def test_the_steps_of_the_workflow_run_and_annotate(tmp_path: Path, forked: Path) -> None:
+def test_the_steps_of_the_workflow_install_a_fixed_commit_run_and_annotate(tmp_path: Path, forked: Path) -> None:
     scratch = Scratch(tmp_path, forked)
     shutil.copy(ROOT / "configs/ci/regress.sh", scratch.folder)
     for name in ("line-07", "line-08"):
@@ -49,9 +41,11 @@ def test_the_steps_of_the_workflow_run_and_annotate(tmp_path: Path, forked: Path
     update = "for n in 07 08; do photostrip compare r strips/line-$n/baseline.json --update; done"
     outcome = scratch.shell(f"photostrip run strips/line-07/project.yaml -o r -q && {update}")
     assert outcome.code == 0, outcome.err
-    commands = [step["run"] for step in workflow()["jobs"]["regress"]["steps"] if "run" in step]
-    assert len(commands) == 3
-    check, regress = (command.partition("#")[0] for command in commands[1:])
+    install, *others = (step for step in workflow()["jobs"]["regress"]["steps"] if "run" in step)
+    assert install["env"]["PHOTOSTRIP"].startswith("git+https://")
+    assert install["env"]["PHOTOSTRIP"].endswith("@COMMIT")
+    assert install["run"] == 'python -m pip install "photostrip @ $PHOTOSTRIP"'
+    check, regress = (step["run"].partition("#")[0] for step in others)
     assert scratch.shell(check).code == 0
     assert scratch.shell(regress).code == 0
     spoil(scratch.folder / "strips/line-08/baseline.json")

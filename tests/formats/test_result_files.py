@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import replace
 from io import StringIO
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from photostrip.errors import InputError
 from photostrip.formats.result_json import line_finder, read_result, to_json
 from photostrip.result.table import plain_of, stored
 from tests.loops import nonempty
-from tests.results import FRAMES, case, result_files, solved
+from tests.results import FRAMES, case, result_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,18 +34,10 @@ def rows(text: str) -> list[dict[str, str]]:
 
 
 def with_odd_ids() -> Document:
-    """The first points and photos of a project under ids that other programs stumble over."""
-    inputs = case("local").inputs
-    o = inputs.observations
-    points = (*ODD_IDS, *o.point_ids[len(ODD_IDS) :])
-    photos = tuple(f"{name} %s,{n}" for n, name in enumerate(o.photo_ids))
-    name_of = dict(zip(o.point_ids, points, strict=True))
-    control = replace(inputs.control, ids=tuple(name_of[name] for name in inputs.control.ids))
-    (strip,) = inputs.strips
-    number = dict(zip(o.photo_ids, photos, strict=True))
-    strips = (replace(strip, photos=tuple(number[photo] for photo in strip.photos)),)
-    renamed = replace(o, point_ids=points, photo_ids=photos)
-    return solved(replace(inputs, observations=renamed, control=control, strips=strips)).document
+    """Give the first points of a result ids that other programs stumble over."""
+    document = case("local").document
+    ids = [*ODD_IDS, *document["points"].values("id")[len(ODD_IDS) :]]
+    return document | {"points": document["points"].with_columns(id=np.array(ids, object))}
 
 
 def test_every_column_stands_on_a_line_of_its_own() -> None:
@@ -119,14 +111,9 @@ def test_a_result_is_read_back(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("{", ":1:2: is not JSON"),
-        ('{"a": 1,}', ":1:"),
-        ("[1, 2]", "has no key `photostrip_result`"),
-        ('{"name": "x"}', "has no key `photostrip_result`"),
         ('{"photostrip_result": 1}', "has the result format 1; expected 2"),
         ('{"photostrip_result": "1"}', "has the result format '1'; expected 2"),
         ("[" * 100_000, "nested too deeply"),
-        ("", "is empty"),
-        ("\x00", "NUL"),
     ],
 )
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str, words: str) -> None:

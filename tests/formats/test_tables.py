@@ -128,7 +128,7 @@ WHOLE = packed(HEADER.encode() * 50)
         ("o.csv", packed(HEADER.encode()), "is compressed (gzip), but its name does not say so"),
         ("o.csv.gz", HEADER.encode(), "is not compressed"),
         ("o.csv.gz", WHOLE[:-9], "ends too early"),
-        ("o.csv.gz", WHOLE[:12] + b"\xff\xff" + WHOLE[14:], "is damaged"),
+        ("o.csv.gz", WHOLE[:10] + b"\xff" * 8 + WHOLE[18:], "is damaged"),
         ("o.csv.gz", WHOLE[:-8] + b"\0" * 8, "is damaged"),
         ("o.csv.gz", packed(b""), "is empty"),
         ("o.csv.gz", packed(b"a\0b"), "NUL"),

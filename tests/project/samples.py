@@ -7,6 +7,7 @@ from pathlib import Path
 from photostrip.errors import Fault, InputError
 from photostrip.project.loading import Project, load_project
 
+Y, P, C, F = "project.yaml", "observations.csv", "control.csv", "fiducials.csv"  # files of the sample
 PROJECT = """\
 photostrip: 1
 name: sample
@@ -76,8 +77,8 @@ MARKED = PROJECT.replace(
     "    distortion:", "    fiducials: {F1: [106, -106], F2: [-106, -106]}\n    distortion:"
 ).replace("control:\n", "fiducial_measurements: {file: fiducials.csv}\ncontrol:\n")
 
-FILES = {"project.yaml": PROJECT, "observations.csv": OBSERVATIONS, "control.csv": CONTROL}
-MARKED_FILES = {**FILES, "project.yaml": MARKED, "fiducials.csv": FIDUCIALS}
+FILES = {Y: PROJECT, P: OBSERVATIONS, C: CONTROL}
+MARKED_FILES = {**FILES, Y: MARKED, F: FIDUCIALS}
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,11 @@ class Sample:
         told = [line for line in lines if line.startswith(place) and all(word in line for word in words)]
         assert len(told) == 1, "\n".join(lines) or "no fault"
         assert lines == told or not alone
+
+    def refuses(self, file: str, old: str, new: str, place: str, *words: str) -> None:
+        """Change one thing, and see what is told of it."""
+        self.change(file, old, new)
+        self.tells(place, *words)
 
 
 def sample(folder: Path, files: dict[str, str] | None = None) -> Sample:

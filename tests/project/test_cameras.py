@@ -8,7 +8,7 @@ import pytest
 import photostrip
 from photostrip.project.check import check_project
 from photostrip.strip.corrections import ideal_from_image
-from tests.project.samples import Sample
+from tests.project.samples import Sample, Y
 
 GIVEN = "    fiducials: {F1: [106, -106], F2: [-106, -106]}\n"
 LENS = "{model: brown, k: [1e-8, 0, 0], direction: image_to_ideal}"
@@ -17,26 +17,28 @@ SIDES = "[F1, F2, 211.98], [F2, F3, 212.01], [F3, F4, 211.99], [F4, F1, 212.02]"
 DIAGONALS = "[F1, F3, 299.82], [F2, F4, 299.80]"
 
 
+def with_distances(places: str, distances: str) -> tuple[str, str]:
+    return GIVEN, f"{places}    fiducial_distances: [{distances}]\n"
+
+
 def certified(marked: Sample, places: str, distances: str) -> list[str]:
-    marked.change("project.yaml", GIVEN, f"{places}    fiducial_distances: [{distances}]\n")
+    marked.change(Y, *with_distances(places, distances))
     return marked.lines()
 
 
-def test_the_camera_gets_coordinates_and_their_quality_is_told(marked: Sample) -> None:
-    assert certified(marked, PLACES, f"{SIDES}, {DIAGONALS}") == []
+@pytest.mark.parametrize(
+    "places",
+    [PLACES, "    fiducials: {F1: [106, -106], F2: [-106, -106], F3: [-106, 106], F4: [106, 106]}\n"],
+    ids=["places", "nominal coordinates"],
+)
+def test_the_camera_gets_coordinates_and_their_quality_is_told(marked: Sample, places: str) -> None:
+    assert certified(marked, places, f"{SIDES}, {DIAGONALS}") == []
     project = marked.load()
-    marks = project.inputs.strips[0].camera.fiducials
-    assert marks["F1"] == pytest.approx((106.0, -106.0), abs=0.05)
-    assert marks["F3"] == pytest.approx((-106.0, 106.0), abs=0.05)
+    for name, xy in (("F1", (106.0, -106.0)), ("F3", (-106.0, 106.0)), ("F4", (106.0, 106.0))):
+        assert project.inputs.strips[0].camera.fiducials[name] == pytest.approx(xy, abs=0.05)
     (note,) = [note for note in project.hints if note.code == "certificate"]
     assert note.message.startswith("camera RC30: 4 fiducial marks from 6 distances, standard deviation of one ")
     assert (note.severity, note.line) == ("note", 9)
-
-
-def test_nominal_coordinates_may_stand_beside_distances(marked: Sample) -> None:
-    nominal = "    fiducials: {F1: [106, -106], F2: [-106, -106], F3: [-106, 106], F4: [106, 106]}\n"
-    assert certified(marked, nominal, f"{SIDES}, {DIAGONALS}") == []
-    assert marked.load().inputs.strips[0].camera.fiducials["F4"] == pytest.approx((106.0, 106.0), abs=0.05)
 
 
 def test_a_distance_that_does_not_fit_is_a_warning(marked: Sample) -> None:
@@ -64,7 +66,7 @@ def polynomial(xy: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("direction", ["image_to_ideal", "ideal_to_image"])
 def test_rays_have_the_directions_of_the_certificate(project: Sample, direction: str) -> None:
     lens = f"{{model: brown, k0: {K0}, k: {list(RADIAL)}, p: {list(DECENTRING)}, direction: {direction}}}"
-    project.change("project.yaml", LENS, lens)
+    project.change(Y, LENS, lens)
     loaded = project.load()
     camera = loaded.inputs.strips[0].camera
     assert camera.distortion is not None
@@ -77,30 +79,34 @@ def test_rays_have_the_directions_of_the_certificate(project: Sample, direction:
     assert f"k0: {K0}" in loaded.resolved
 
 
-def distances(places: str, given: str) -> tuple[str, str]:
-    return GIVEN, f"{places}    fiducial_distances: [{given}]\n"
-
-
 TABLE = "{model: radial-table, k0: 1e-4, radius: [0, 9], distortion: [0, 0], direction: image_to_ideal}"
 
 
 @pytest.mark.parametrize(
     ("texts", "place", "words"),
     [
-        (distances(PLACES, SIDES), "", "fiducial_distances: 4 independent distances do not fix a figure of 4 marks"),
-        (distances(PLACES, f"{SIDES}, [F1, F9, 1.0]"), "", "RC30.fiducial_distances[4]: the camera has no mark F9"),
-        (distances(PLACES.replace("top-left", "middle"), SIDES), "", "fiducial_places.F3: `middle` is not known"),
-        (distances(PLACES, SIDES.replace("211.98", "-2")), "", "fiducial_distances[0][2]: -2 is out of range"),
-        (distances(PLACES, SIDES.replace("211.98", "nan")), "", "fiducial_distances[0][2]"),
-        (distances(PLACES, "[F1, F2]"), "", "fiducial_distances[0]"),
-        (distances("", SIDES), "", "distances alone do not say which mark is where"),
-        (distances(GIVEN + PLACES, SIDES), "", "places of fiducial marks are for distances between them without"),
+        (
+            with_distances(PLACES, SIDES),
+            "",
+            "fiducial_distances: 4 independent distances do not fix a figure of 4 marks",
+        ),
+        (
+            with_distances(PLACES, f"{SIDES}, [F1, F9, 1.0]"),
+            "",
+            "RC30.fiducial_distances[4]: the camera has no mark F9",
+        ),
+        (with_distances(PLACES.replace("top-left", "middle"), SIDES), "", "fiducial_places.F3: `middle` is not known"),
+        (with_distances(PLACES, SIDES.replace("211.98", "-2")), "", "fiducial_distances[0][2]: -2 is out of range"),
+        (with_distances(PLACES, SIDES.replace("211.98", "nan")), "", "fiducial_distances[0][2]"),
+        (with_distances(PLACES, "[F1, F2]"), "", "fiducial_distances[0]"),
+        (with_distances("", SIDES), "", "distances alone do not say which mark is where"),
+        (with_distances(GIVEN + PLACES, SIDES), "", "places of fiducial marks are for distances between them without"),
         ((LENS, "{model: brown, k0: 1.5, direction: image_to_ideal}"), "project.yaml:9:", "1.5 is out of range"),
         ((LENS, TABLE), "project.yaml:9:", "`k0` does not belong to model radial-table"),
     ],
 )
 def test_certificates_that_are_wrong(marked: Sample, texts: tuple[str, str], place: str, words: str) -> None:
-    marked.change("project.yaml", *texts)
+    marked.change(Y, *texts)
     marked.tells(place, words)
 
 

@@ -47,13 +47,14 @@ BUNDLE = "processing:\n  adjustment: bundle\n"
 Y, G, I = "project.yaml", "gnss.csv", "imu.csv"  # noqa: E741
 
 
-def given(folder: Path) -> Sample:
+@pytest.fixture
+def given(tmp_path: Path) -> Sample:
     text = PROJECT.replace("processing:\n", BUNDLE).replace("output:\n", f"{POSITIONS}{ORIENTATIONS}output:\n")
-    return sample(folder, {**FILES, Y: text, G: GNSS, I: IMU})
+    return sample(tmp_path, {**FILES, Y: text, G: GNSS, I: IMU})
 
 
-def test_positions_come_in_the_internal_order(tmp_path: Path) -> None:
-    found = given(tmp_path).load().inputs.positions
+def test_positions_come_in_the_internal_order(given: Sample) -> None:
+    found = given.load().inputs.positions
     assert found is not None
     assert found.photos == ("1001", "1002", "2001", "2002")
     assert found.enu[0].tolist() == [500000.25, 4650000.5, 2012.125]  # the list has north first
@@ -64,8 +65,8 @@ def test_positions_come_in_the_internal_order(tmp_path: Path) -> None:
     assert (found.lever_arm, found.correction) == ((0.1, -0.2, 1.5), "drift")
 
 
-def test_orientations_come_in_radians(tmp_path: Path) -> None:
-    found = given(tmp_path).load().inputs.orientations
+def test_orientations_come_in_radians(given: Sample) -> None:
+    found = given.load().inputs.orientations
     assert found is not None
     assert (found.photos, found.system, found.observed) == (("1001", "2002"), "omega-phi-kappa", True)
     assert found.angles.shape == (2, 3)
@@ -74,43 +75,39 @@ def test_orientations_come_in_radians(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.sigma, [[0.1, 0.2, 0.3], [0.05, 0.06, 0.08]], rtol=1e-12)
 
 
-def test_the_resolved_project_reads_as_the_same(tmp_path: Path) -> None:
-    assert "lever_arm" in given(tmp_path).reads_as_the_same()
+def test_the_resolved_project_reads_as_the_same(given: Sample) -> None:
+    assert "lever_arm" in given.reads_as_the_same()
 
 
-def test_approximate_orientations_need_no_standard_deviations(tmp_path: Path) -> None:
-    project = given(tmp_path)
-    project.change(Y, "  sigma: [0.05, 0.06, 0.08]\n  sigma_angles: [0.02, 0.02, 0.04]\n", "  role: approximate\n")
-    found = project.load().inputs.orientations
+def test_approximate_orientations_need_no_standard_deviations(given: Sample) -> None:
+    given.change(Y, "  sigma: [0.05, 0.06, 0.08]\n  sigma_angles: [0.02, 0.02, 0.04]\n", "  role: approximate\n")
+    found = given.load().inputs.orientations
     assert found is not None
     assert not found.observed
 
 
-def test_the_strip_method_says_that_it_uses_none(tmp_path: Path) -> None:
-    project = given(tmp_path)
-    project.change(Y, "adjustment: bundle", "adjustment: polynomial")
-    told = [note for note in project.load().hints if note.code == "cameras-not-used"]
+def test_the_strip_method_says_that_it_uses_none(given: Sample) -> None:
+    given.change(Y, "adjustment: bundle", "adjustment: polynomial")
+    told = [note for note in given.load().hints if note.code == "cameras-not-used"]
     assert [note.key for note in told] == ["camera_positions", "orientations"]
 
 
-def test_a_bundle_does_without_control_and_takes_single_photos(tmp_path: Path) -> None:
-    project = given(tmp_path)
-    text = (tmp_path / Y).read_text(encoding="utf-8")
+def test_a_bundle_does_without_control_and_takes_single_photos(given: Sample) -> None:
+    text = (given.folder / Y).read_text(encoding="utf-8")
     start, end = text.index("control:"), text.index("camera_positions:")
-    project.write(Y, text[:start] + text[end:].replace("[2001, 2002]", "[2001]"))
-    project.change(Y, "    photos: [2001, 2002]", "    photos: [2001]")
-    loaded = project.load()
+    given.write(Y, text[:start] + text[end:].replace("[2001, 2002]", "[2001]"))
+    given.change(Y, "    photos: [2001, 2002]", "    photos: [2001]")
+    loaded = given.load()
     assert (len(loaded.inputs.control), loaded.inputs.frames) == (0, ())
     assert loaded.inputs.output is not None
     assert loaded.inputs.output.axes == ("north", "east", "up")
 
 
-def test_self_calibration_of_each_camera(tmp_path: Path) -> None:
-    project = given(tmp_path)
-    project.change(Y, "  adjustment: bundle\n", "  adjustment: bundle\n  self_calibration: [k1, p1]\n")
-    assert [strip.calibrate for strip in project.load().inputs.strips] == [("k1", "p1")] * 2
-    project.change(Y, "    format:", "    self_calibration: [principal_distance]\n    format:")
-    assert [strip.calibrate for strip in project.load().inputs.strips] == [("principal_distance",)] * 2
+def test_self_calibration_of_each_camera(given: Sample) -> None:
+    given.change(Y, "  adjustment: bundle\n", "  adjustment: bundle\n  self_calibration: [k1, p1]\n")
+    assert [strip.calibrate for strip in given.load().inputs.strips] == [("k1", "p1")] * 2
+    given.change(Y, "    format:", "    self_calibration: [principal_distance]\n    format:")
+    assert [strip.calibrate for strip in given.load().inputs.strips] == [("principal_distance",)] * 2
 
 
 WRONG = [
@@ -142,30 +139,26 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("file", "old", "new", "place", "words"), WRONG)
-def test_what_is_wrong_is_explained(tmp_path: Path, file: str, old: str, new: str, place: str, words: str) -> None:
-    project = given(tmp_path)
-    project.change(file, old, new)
-    project.tells(place, words)
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_explained(given: Sample, case: tuple[str, ...]) -> None:
+    given.refuses(*case)
 
 
-def test_a_table_without_any_photo_of_the_strips(tmp_path: Path) -> None:
-    project = given(tmp_path)
-    project.write(G, "photo,x,y,z\nDSC_1001,1,2,3\nDSC_1002,1,2,3\n")
-    project.tells("", "has none of the photos of the strips; its photos are DSC_1001, DSC_1002", alone=True)
+def test_a_table_without_any_photo_of_the_strips(given: Sample) -> None:
+    given.write(G, "photo,x,y,z\nDSC_1001,1,2,3\nDSC_1002,1,2,3\n")
+    given.tells("", "has none of the photos of the strips; its photos are DSC_1001, DSC_1002", alone=True)
 
 
-def test_single_photos_are_for_bundles_only(tmp_path: Path) -> None:
-    project = given(tmp_path)
-    project.change(Y, "adjustment: bundle", "adjustment: polynomial", "[2001, 2002]", "[2001]")
-    project.tells("", "only one photo", "adjustment: bundle")
+def test_single_photos_are_for_bundles_only(given: Sample) -> None:
+    given.change(Y, "adjustment: bundle", "adjustment: polynomial", "[2001, 2002]", "[2001]")
+    given.tells("", "only one photo", "adjustment: bundle")
 
 
 PHOTOS = ("1001", "1002", "2001", "2002")
 PLACES = np.array([[650000.0 + 900.0 * n, 4650000.0, 2000.0] for n in range(len(PHOTOS))])  # far from the meridian
 TRUE = Rotation.from_euler("XYZ", [[3, -4, 100], [-2, 5, 80], [1, 2, -175], [-85, 3, 20]], degrees=True)
 NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # east, north, up of north, east, down
-DOWN = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # ahead, right, down of image axes
+DOWN = NED  # ahead, right, down of image axes
 AHEAD = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # right is right, up is up, against the view
 
 START = "  role: approximate\n"

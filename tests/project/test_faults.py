@@ -6,9 +6,8 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.project.loading import load_project
-from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, Sample, sample
+from tests.project.samples import FILES, MARKED, MARKED_FILES, PROJECT, C, F, P, Sample, Y, sample
 
-Y, P, C, F = "project.yaml", "observations.csv", "control.csv", "fiducials.csv"
 SIGMA = "    sigma: [0.05, 0.06, 0.08]\n"
 SECOND_LIST = '  - {file: second.csv, crs: "EPSG:32634", axes: [east, north, up], sigma: [1, 1, 1]}\noutput:'
 
@@ -234,20 +233,14 @@ MARKS = [
 ONE_FAULT = [*YAML_SYNTAX, *YAML_MANNERS, *SCHEMA, *NOT_YET, *REFERENCES, *FRAMES, *FILES_NAMED, *TABLES]
 
 
-@pytest.mark.parametrize(("file", "old", "new", "place", "words"), [(*case[:4], case[4:]) for case in ONE_FAULT])
-def test_a_wrong_project_is_explained(
-    project: Sample, file: str, old: str, new: str, place: str, words: tuple[str, ...]
-) -> None:
-    project.change(file, old, new)
-    project.tells(place, *words)
+@pytest.mark.parametrize("case", ONE_FAULT)
+def test_a_wrong_project_is_explained(project: Sample, case: tuple[str, ...]) -> None:
+    project.refuses(*case)
 
 
-@pytest.mark.parametrize(("file", "old", "new", "place", "words"), [(*case[:4], case[4:]) for case in MARKS])
-def test_wrong_fiducial_marks_are_explained(
-    marked: Sample, file: str, old: str, new: str, place: str, words: tuple[str, ...]
-) -> None:
-    marked.change(file, old, new)
-    marked.tells(place, *words)
+@pytest.mark.parametrize("case", MARKS)
+def test_wrong_fiducial_marks_are_explained(marked: Sample, case: tuple[str, ...]) -> None:
+    marked.refuses(*case)
 
 
 @pytest.mark.parametrize("files", [FILES, MARKED_FILES])

@@ -11,7 +11,7 @@ from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import adjust_project, load_project
 from tests.geodesy.test_local_frame import in_both
-from tests.project.samples import FILES, PROJECT, Sample, sample
+from tests.project.samples import FILES, PROJECT, Sample, Y, sample
 
 LISTS = """\
 control:
@@ -75,7 +75,7 @@ def test_zones_that_cannot_be_joined(
 ) -> None:
     given, _ = project(tmp_path, common, role)
     text = (tmp_path / "project.yaml").read_text(encoding="utf-8")
-    given.write("project.yaml", text.replace(old, new, 1) if old == NORTH else text.replace(old, new))
+    given.write(Y, text.replace(old, new, 1) if old == NORTH else text.replace(old, new))
     given.tells(place, "other_zone: ", words)
 
 

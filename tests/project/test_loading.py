@@ -11,7 +11,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.loading import Project, load_project
-from tests.project.samples import CONTROL, FIDUCIALS, OBSERVATIONS, PROJECT, Sample, sample
+from tests.project.samples import CONTROL, FIDUCIALS, OBSERVATIONS, PROJECT, C, P, Sample, Y, sample
 
 NANOMETRE = 1e-6  # mm
 
@@ -50,8 +50,8 @@ def test_the_sample(project: Sample) -> None:
 
 
 def test_settings_not_given_are_the_defaults_of_the_mathematics(project: Sample) -> None:
-    project.change("project.yaml", "output:\n  angles: {system: omega-phi-kappa, unit: gon}\n", "")
-    project.change("project.yaml", PROJECT[PROJECT.index("processing:") :], "")
+    project.change(Y, "output:\n  angles: {system: omega-phi-kappa, unit: gon}\n", "")
+    project.change(Y, PROJECT[PROJECT.index("processing:") :], "")
     assert project.load().settings == Settings()
 
 
@@ -70,7 +70,7 @@ processing:
   interior: {transform: affine}
 tolerances: {check_rms_xy: 0.4, sigma0_um: 7}
 """
-    project.change("project.yaml", PROJECT[PROJECT.index("processing:") :], new)
+    project.change(Y, PROJECT[PROJECT.index("processing:") :], new)
     settings = project.load().settings
     assert (settings.adjustment, settings.polynomial.degree) == ("similarity", "2")
     assert (settings.relative.screening, settings.relative.grubbs_alpha) == ("tau", 0.01)
@@ -85,8 +85,8 @@ tolerances: {check_rms_xy: 0.4, sigma0_um: 7}
 
 
 def test_a_section_with_everything_commented_out_is_empty(project: Sample) -> None:
-    project.change("project.yaml", PROJECT[PROJECT.index("processing:") :], "processing:\n  # refraction: true\n")
-    project.change("project.yaml", "processing:", "tolerances:\nprocessing:\n  relative:\n  polynomial:\n")
+    project.change(Y, PROJECT[PROJECT.index("processing:") :], "processing:\n  # refraction: true\n")
+    project.change(Y, "processing:", "tolerances:\nprocessing:\n  relative:\n  polynomial:\n")
     settings = project.load().settings
     assert (settings.relative, settings.tolerances) == (Settings().relative, {})
 
@@ -94,7 +94,7 @@ def test_a_section_with_everything_commented_out_is_empty(project: Sample) -> No
 def test_every_file_read_is_listed(marked: Sample) -> None:
     marked.write("presets/film.yaml", "extends: base.yaml\n")
     marked.write("presets/base.yaml", "processing: {refraction: true}\n")
-    marked.change("project.yaml", "name: sample", "extends: presets/film.yaml")
+    marked.change(Y, "name: sample", "extends: presets/film.yaml")
     loaded = marked.load()
     names = ["project.yaml", "presets/film.yaml", "presets/base.yaml"]
     names += ["observations.csv", "fiducials.csv", "control.csv"]
@@ -119,7 +119,7 @@ def test_paths_behind_a_link_lead_where_the_system_finds_them(tmp_path: Path) ->
     project = sample(tmp_path / "runs" / "july")
     (tmp_path / "latest").symlink_to(tmp_path / "runs" / "july")
     (tmp_path / "runs" / "july" / "observations.csv").rename(tmp_path / "runs" / "o.csv")
-    project.change("project.yaml", "observations.csv", "../o.csv")
+    project.change(Y, "observations.csv", "../o.csv")
     loaded = load_project(tmp_path / "latest" / "project.yaml")
     assert len(loaded.inputs.observations) == 8
     assert 'file: "../o.csv"' in loaded.resolved
@@ -128,9 +128,9 @@ def test_paths_behind_a_link_lead_where_the_system_finds_them(tmp_path: Path) ->
 def image_case(folder: Path, system: str, row: str) -> tuple[float, float]:
     """Load a project whose first point is `row` and give where it comes out, in mm."""
     project = sample(folder)
-    project.change("project.yaml", "    format: [230, 230]", "    format: [200, 100]\n    pixel_size: 0.01")
-    project.change("project.yaml", "  unit: mm\n  y_axis: up\n", system)
-    project.change("observations.csv", "10.5,-20.25", row)
+    project.change(Y, "    format: [230, 230]", "    format: [200, 100]\n    pixel_size: 0.01")
+    project.change(Y, "  unit: mm\n  y_axis: up\n", system)
+    project.change(P, "10.5,-20.25", row)
     return image_points(project.load())["1001", "P1"]
 
 
@@ -168,11 +168,11 @@ def test_micrometres_are_divided_so_that_nothing_is_lost(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(("unit", "factor"), [("unit: mm", 1.0), ("unit: um", 1e-3), ("unit: px\n  y_axis: up", 0.01)])
 def test_standard_deviations_have_the_unit_of_the_coordinates(project: Sample, unit: str, factor: float) -> None:
-    project.change("project.yaml", "    format: [230, 230]", "    format: [200, 100]\n    pixel_size: 0.01")
-    project.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", f"{unit}\n  sigma: 0.5")
+    project.change(Y, "    format: [230, 230]", "    format: [200, 100]\n    pixel_size: 0.01")
+    project.change(Y, "unit: mm\n  y_axis: up\n  sigma: 0.005", f"{unit}\n  sigma: 0.5")
     rows = OBSERVATIONS.splitlines()
     table = [rows[0] + ",sx,sy", rows[1] + ",0.25,0.75", *(row + ",," for row in rows[2:])]
-    project.write("observations.csv", "\n".join(table))
+    project.write(P, "\n".join(table))
     sigma = project.load().inputs.observations.sigma
     np.testing.assert_allclose(sigma[0], [0.25 * factor, 0.75 * factor], rtol=1e-12)
     np.testing.assert_allclose(sigma[1:], 0.5 * factor, rtol=1e-12)
@@ -184,8 +184,8 @@ def test_pixels_of_two_cameras(project: Sample) -> None:
         "cameras:\n  big: {principal_distance: 100, format: [80, 60], pixel_size: 0.004}\n"
         "  small: {principal_distance: 50, format: [40, 20], pixel_size: 0.008}\n"
     )
-    project.change("project.yaml", cameras, new, "camera: RC30", "camera: big", "camera: RC30", "camera: small")
-    project.change("project.yaml", "unit: mm\n  y_axis: up", "unit: px\n  y_axis: down")
+    project.change(Y, cameras, new, "camera: RC30", "camera: big", "camera: RC30", "camera: small")
+    project.change(Y, "unit: mm\n  y_axis: up", "unit: px\n  y_axis: down")
     found = image_points(project.load())
     assert found["1001", "P1"] == pytest.approx((10.5 * 0.004 - 40, 30 + 20.25 * 0.004), abs=NANOMETRE)
     assert found["2001", "P2"] == pytest.approx((10 * 0.008 - 20, 10 - 20 * 0.008), abs=NANOMETRE)
@@ -193,8 +193,8 @@ def test_pixels_of_two_cameras(project: Sample) -> None:
 
 def in_pixels(marked: Sample, *key: str) -> list[list[str]]:
     """Say that the sample is in pixels, with other lines for the format of the camera; and give the rows of marks."""
-    marked.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
-    marked.change("project.yaml", "    format: [230, 230]\n", *key or ("",))
+    marked.change(Y, "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
+    marked.change(Y, "    format: [230, 230]\n", *key or ("",))
     return [row.split(",") for row in FIDUCIALS.splitlines()[1:]]
 
 
@@ -231,7 +231,7 @@ def test_marks_in_one_place_do_not_tell_it(marked: Sample) -> None:
 
 def test_marks_may_have_a_unit_of_their_own(marked: Sample) -> None:
     old, new = "{file: fiducials.csv}", "{file: fiducials.csv, unit: um, y_axis: down, sigma: 3}"
-    marked.change("project.yaml", old, new)
+    marked.change(Y, old, new)
     fiducials = marked.load().inputs.fiducials
     assert fiducials is not None
     np.testing.assert_allclose(fiducials.xy[0], [0.1061, 0.106], rtol=1e-12)
@@ -252,8 +252,8 @@ def test_marks_may_have_a_unit_of_their_own(marked: Sample) -> None:
     ],
 )
 def test_control_comes_in_the_order_of_its_axes(project: Sample, axes: str, row: str, expected: list[float]) -> None:
-    project.change("project.yaml", "EPSG:32633\n    axes: [east, north, up]", f"local\n    axes: {axes}")
-    project.write("control.csv", f"point,x,y,z,use\nG1,{row}\n")
+    project.change(Y, "EPSG:32633\n    axes: [east, north, up]", f"local\n    axes: {axes}")
+    project.write(C, f"point,x,y,z,use\nG1,{row}\n")
     control = project.load().inputs.control
     np.testing.assert_array_equal(control.enu, [expected])
     np.testing.assert_array_equal(control.use, [~np.isnan(expected)])
@@ -277,14 +277,14 @@ def test_control_comes_in_the_order_of_its_axes(project: Sample, axes: str, row:
 def test_sigma_of_a_row_counts_before_that_of_the_list(
     project: Sample, old: str, new: str, table: str, expected: list[float]
 ) -> None:
-    project.change("project.yaml", old, new)
-    project.write("control.csv", table)
+    project.change(Y, old, new)
+    project.write(C, table)
     np.testing.assert_array_equal(project.load().inputs.control.sigma, [expected])
 
 
 def test_each_control_list_has_its_frame(project: Sample) -> None:
     second = "  - {file: b.csv, crs: 'EPSG:32634', axes: [north, east, up], sigma: [1, 2, 3]}\noutput:"
-    project.change("project.yaml", "output:", second)
+    project.change(Y, "output:", second)
     project.write("b.csv", "point,x,y,z\nN1,4649871,100,5\n")
     inputs = project.load().inputs
     assert [frame.crs for frame in inputs.frames] == ["EPSG:32633", "EPSG:32634"]
@@ -294,9 +294,9 @@ def test_each_control_list_has_its_frame(project: Sample) -> None:
 
 
 def test_geocentric_needs_no_axes(project: Sample) -> None:
-    project.change("project.yaml", "EPSG:32633\n    axes: [east, north, up]", "geocentric")
-    project.change("project.yaml", "height: ellipsoidal", "ellipsoid: {a: 1737400, b: 1737400}")
-    project.write("control.csv", "point,x,y,z\nG1,1500000,200000,700000\n")
+    project.change(Y, "EPSG:32633\n    axes: [east, north, up]", "geocentric")
+    project.change(Y, "height: ellipsoidal", "ellipsoid: {a: 1737400, b: 1737400}")
+    project.write(C, "point,x,y,z\nG1,1500000,200000,700000\n")
     inputs = project.load().inputs
     assert inputs.frames[0] == FrameSpec("geocentric", ("x", "y", "z"), ellipsoid=(1737400.0, 1737400.0))
     assert inputs.control.enu.tolist() == [[1500000, 200000, 700000]]
@@ -315,8 +315,8 @@ def test_geocentric_needs_no_axes(project: Sample) -> None:
     ],
 )
 def test_the_frame_of_the_results(project: Sample, said: str, expected: FrameSpec | None) -> None:
-    project.change("project.yaml", "height: ellipsoidal", "height: orthometric\n    geoid_undulation: 44")
-    project.change("project.yaml", "output:", f"output:\n  {said}")
+    project.change(Y, "height: ellipsoidal", "height: orthometric\n    geoid_undulation: 44")
+    project.change(Y, "output:", f"output:\n  {said}")
     assert project.load().inputs.output == expected
 
 
@@ -333,8 +333,7 @@ def test_the_frame_of_the_results(project: Sample, said: str, expected: FrameSpe
     ],
 )
 def test_curvature_of_eq_153_is_for_local_coordinates(project: Sample, keys: str, radius: float | str) -> None:
-    project.change("project.yaml", "EPSG:32633", "local")
-    project.change("project.yaml", "processing:", f"processing:\n  earth_curvature: model\n  {keys}")
+    project.change(Y, "EPSG:32633", "local", "processing:", f"processing:\n  earth_curvature: model\n  {keys}")
     if isinstance(radius, str):
         project.tells("", radius)
     else:
@@ -342,7 +341,7 @@ def test_curvature_of_eq_153_is_for_local_coordinates(project: Sample, keys: str
 
 
 def test_photos_in_no_strip(project: Sample) -> None:
-    project.write("observations.csv", OBSERVATIONS + "3001,P9,1,2\n3001,P1,1,2\n1001.tif,P1,1,2\n")
+    project.write(P, OBSERVATIONS + "3001,P9,1,2\n3001,P1,1,2\n1001.tif,P1,1,2\n")
     loaded = project.load()
     note = notes(loaded)["photo-in-no-strip"]
     assert note.photos == ("3001", "1001.tif")
@@ -353,10 +352,10 @@ def test_photos_in_no_strip(project: Sample) -> None:
 
 
 def test_points_measured_once(project: Sample) -> None:
-    project.write("observations.csv", OBSERVATIONS + "1001,P7,1,2\n1002,G7,1,2\n")
-    project.write("control.csv", CONTROL + "G7,500100,4649871,212,xyz,\n")
+    project.write(P, OBSERVATIONS + "1001,P7,1,2\n1002,G7,1,2\n")
+    project.write(C, CONTROL + "G7,500100,4649871,212,xyz,\n")
     assert set(notes(project.load())) == {"measured-once"}  # control on one photo helps to orient it
-    project.change("project.yaml", "processing:\n", "processing:\n  adjustment: polynomial\n")
+    project.change(Y, "processing:\n", "processing:\n  adjustment: polynomial\n")
     found = notes(project.load())
     assert found["measured-once"].points == ("P7",)
     assert found["control-measured-once"].points == ("G7",)
@@ -379,8 +378,8 @@ def test_points_measured_once(project: Sample) -> None:
 def test_control_never_measured_and_a_point_of_nearly_that_name(
     project: Sample, given: str, measured: str, alike: bool
 ) -> None:
-    project.write("observations.csv", OBSERVATIONS + f"1001,{measured},1,2\n1002,{measured},3,4\n")
-    project.write("control.csv", CONTROL + f"{given},500100,4649871,212,xyz,\n")
+    project.write(P, OBSERVATIONS + f"1001,{measured},1,2\n1002,{measured},3,4\n")
+    project.write(C, CONTROL + f"{given},500100,4649871,212,xyz,\n")
     note = notes(project.load())["control-not-measured"]
     assert note.points == (given,)
     assert (f"`{given}`, did you mean `{measured}`?" in note.message) is alike
@@ -389,15 +388,15 @@ def test_control_never_measured_and_a_point_of_nearly_that_name(
 
 
 def test_points_switched_off(project: Sample) -> None:
-    project.write("control.csv", CONTROL + "Q1,,,,off,\n")
+    project.write(C, CONTROL + "Q1,,,,off,\n")
     loaded = project.load()
     assert notes(loaded)["control-off"].points == ("Q1",)
     assert "Q1" not in loaded.inputs.control.ids
 
 
 def test_unused_cameras_and_columns(project: Sample) -> None:
-    project.change("project.yaml", "strips:", "  old: {principal_distance: 100}\nstrips:")
-    project.write("control.csv", "point,x,y,z,remark\nG1,500100,4649871,212,post\n")
+    project.change(Y, "strips:", "  old: {principal_distance: 100}\nstrips:")
+    project.write(C, "point,x,y,z,remark\nG1,500100,4649871,212,post\n")
     found = notes(project.load())
     assert found["unused-camera"].message == "1 camera belongs to no strip: old"
     assert found["unused-column"].message == "1 column not used: remark; used: point, x, y, z"
@@ -409,9 +408,9 @@ def test_unused_cameras_and_columns(project: Sample) -> None:
 
 
 def test_blanks_around_ids_and_a_byte_order_mark(project: Sample) -> None:
-    project.write("observations.csv", "\ufeff" + OBSERVATIONS.replace("1001,P1", "1001,P1 ").replace("\n", "\r\n"))
-    project.change("project.yaml", "[2001, 2002]", "['2001 ', 2002]")
-    project.write("project.yaml", "\ufeff" + (project.folder / "project.yaml").read_text(encoding="utf-8"))
+    project.write(P, "\ufeff" + OBSERVATIONS.replace("1001,P1", "1001,P1 ").replace("\n", "\r\n"))
+    project.change(Y, "[2001, 2002]", "['2001 ', 2002]")
+    project.write(Y, "\ufeff" + (project.folder / "project.yaml").read_text(encoding="utf-8"))
     loaded = project.load()
     assert image_points(loaded)["1001", "P1"] == (10.5, -20.25)
     assert loaded.inputs.strips[1].photos == ("2001", "2002")
@@ -444,20 +443,20 @@ def test_blanks_around_ids_and_a_byte_order_mark(project: Sample) -> None:
 def test_the_same_table_written_otherwise(tmp_path: Path, text: str) -> None:
     expected = image_points(sample(tmp_path / "plain").load())
     project = sample(tmp_path / "other")
-    project.write("observations.csv", text)
+    project.write(P, text)
     assert image_points(project.load()) == expected
 
 
 def test_packed_tables(project: Sample) -> None:
     for name, text in [("observations.csv", OBSERVATIONS), ("control.csv", CONTROL)]:
         project.write(name + ".gz", gzip.compress(text.encode()))
-        project.change("project.yaml", name, name + ".gz")
+        project.change(Y, name, name + ".gz")
         (project.folder / name).unlink()
     assert len(project.load().inputs.observations) == 8
 
 
 def test_words_of_control_in_any_case_and_empty(project: Sample) -> None:
-    project.write("control.csv", "point,x,y,z,use,role\nG1,500100,4649871,212,XY,Check\nP2,500200,4649971,212,,\n")
+    project.write(C, "point,x,y,z,use,role\nG1,500100,4649871,212,XY,Check\nP2,500200,4649971,212,,\n")
     control = project.load().inputs.control
     assert control.use.tolist() == [[True, True, False], [True, True, True]]
     assert control.check.tolist() == [True, False]
@@ -470,5 +469,5 @@ def test_a_project_may_be_json(tmp_path: Path) -> None:
 
     project = Sample(tmp_path)
     sample(tmp_path)
-    project.write("project.yaml", json.dumps(yaml.safe_load(PROJECT.replace("EPSG:32633", "'EPSG:32633'"))))
+    project.write(Y, json.dumps(yaml.safe_load(PROJECT.replace("EPSG:32633", "'EPSG:32633'"))))
     assert project.load().inputs.strips[0].photos == ("1001", "1002")

@@ -16,7 +16,7 @@ from photostrip.project.check import check_project
 from photostrip.simulation import Flight, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
-from tests.project.samples import OBSERVATIONS, Sample
+from tests.project.samples import OBSERVATIONS, P, Sample, Y
 from tests.simulated import inputs_of
 
 SIGMA = 0.005  # mm
@@ -84,9 +84,9 @@ def told(project: Sample) -> tuple[list[str], list[str]]:
 def test_an_exchanged_pair_does_not_hide_the_unit(project: Sample, factor: float, unit: list[str]) -> None:
     """It ended the reading before the unit was looked at."""
     listing, photos = listed({2}, factor=factor)
-    project.write("observations.csv", listing)
-    project.change("project.yaml", "[1001, 1002]", f"[{', '.join(sorted(photos))}]")
-    project.change("project.yaml", "  - id: B\n    camera: RC30\n    photos: [2001, 2002]\n", "")
+    project.write(P, listing)
+    project.change(Y, "[1001, 1002]", f"[{', '.join(sorted(photos))}]")
+    project.change(Y, "  - id: B\n    camera: RC30\n    photos: [2001, 2002]\n", "")
     assert told(project) == (["pair-exchanged"], unit)
 
 
@@ -108,7 +108,7 @@ def test_no_fault_hides_the_unit(
     project: Sample, file: str, old: str, new: str, code: str, unit: str, expected: list[str]
 ) -> None:
     """Every fault did, and was told alone."""
-    project.change("project.yaml", "unit: mm", f"unit: {unit}")
+    project.change(Y, "unit: mm", f"unit: {unit}")
     project.change(file, old, new)
     assert told(project) == ([code], expected)
 
@@ -117,7 +117,7 @@ def test_marks_that_orient_no_photo_say_nothing_of_the_unit(marked: Sample) -> N
     """Coordinates of a comparator have their origin anywhere, and were told to reach too far."""
     rows = [row.split(",") for row in OBSERVATIONS.split()[1:]]
     lines = ["photo,point,x,y", *(f"{a},{b},{float(x) + 300},{float(y) + 300}" for a, b, x, y in nonempty(rows))]
-    marked.write("observations.csv", "\n".join(lines))
+    marked.write(P, "\n".join(lines))
     marked.change("fiducials.csv", "2002,F1,106.1,-106\n", "")
     checked = check_project(marked.folder / "project.yaml")
     assert "too-few-marks" in {each.code for each in checked.faults}
@@ -126,5 +126,5 @@ def test_marks_that_orient_no_photo_say_nothing_of_the_unit(marked: Sample) -> N
 
 def test_a_header_that_is_there_twice_is_a_fault_of_its_row(project: Sample) -> None:
     """Its photo is in no strip, and has no row that is left."""
-    project.change("observations.csv", "photo,point,x,y\n", "photo,point,x,y\nphoto,point,x,y\n")
+    project.change(P, "photo,point,x,y\n", "photo,point,x,y\nphoto,point,x,y\n")
     assert told(project) == (["number", "number"], [])

@@ -8,7 +8,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats.result_json import read_result
 from photostrip.project.loading import Project
-from tests.project.samples import FILES, OBSERVATIONS, PROJECT, Sample, sample
+from tests.project.samples import FILES, OBSERVATIONS, PROJECT, P, Sample, Y, sample
 from tests.results import spec, write_project
 
 STRIPS = PROJECT[PROJECT.index("strips:") : PROJECT.index("observations:")]
@@ -50,13 +50,13 @@ def test_those_that_no_strip_has_are_the_rest(tmp_path: Path) -> None:
 
 def test_ids_are_counted_as_people_count(tmp_path: Path) -> None:
     project = with_photos(tmp_path, "{camera: RC30}")
-    project.write("observations.csv", OBSERVATIONS.replace("1001", "A10").replace("2002", "A9"))
+    project.write(P, OBSERVATIONS.replace("1001", "A10").replace("2002", "A9"))
     assert [name for name, _, _ in flights(project.load())] == ["1002", "2001", "A9", "A10"]
 
 
 def test_each_group_has_its_camera(tmp_path: Path) -> None:
     project = with_photos(tmp_path, "[{camera: RMK, photos: [1002]}, {camera: RC30}]")
-    project.change("project.yaml", PROJECT[PROJECT.index("  RC30:") : PROJECT.index("strips:")], TWO_CAMERAS)
+    project.change(Y, PROJECT[PROJECT.index("  RC30:") : PROJECT.index("strips:")], TWO_CAMERAS)
     loaded = project.load()
     assert [strip.camera.name for strip in loaded.inputs.strips] == ["RC30", "RMK", "RC30", "RC30"]
 
@@ -82,25 +82,26 @@ WRONG = [
     ("{camera: RC30, photos: [1001]}", STRIPS, "project.yaml:16:33: photos.photos[0]:", "already listed, in strip A"),
     ("{camera: RC30, photos: [1003]}", "", "project.yaml:9:33: photos.photos[0]:", "no point on photo 1003", "remove"),
     ("[{camera: RC30}, {camera: RC30}]", "", "project.yaml:9:26: photos[1]:", "second entry", "list its photos"),
-    ("{camera: RC30}", SECOND.replace("B", "1001"), "project.yaml:13:18: photos.camera:", "has the id of a strip"),
+    (
+        "{camera: RC30}",
+        "strips:\n" + SECOND.replace("B", "1001"),
+        "project.yaml:13:18: photos.camera:",
+        "has the id of a strip",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("photos", "strips", "place", "words"), [(*case[:3], case[3:]) for case in WRONG])
-def test_what_is_wrong_with_photos(
-    tmp_path: Path, photos: str, strips: str, place: str, words: tuple[str, ...]
-) -> None:
-    if strips and not strips.startswith("strips"):
-        strips = f"strips:\n{strips}"
-    project = with_photos(tmp_path, photos, strips)
-    project.tells(place, *words)
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_with_photos(tmp_path: Path, case: tuple[str, ...]) -> None:
+    photos, strips, place, *words = case
+    with_photos(tmp_path, photos, strips).tells(place, *words)
 
 
 def test_without_photos_of_any_kind(tmp_path: Path) -> None:
     project = sample(tmp_path, {**FILES, "project.yaml": PROJECT.replace(STRIPS, "")})
     missing = "project.yaml:1:1: strips: `strips` is missing; expected photos in flight order by strips;"
     project.tells(missing, alone=True)
-    project.change("project.yaml", "name: sample", "stripes: []")
+    project.change(Y, "name: sample", "stripes: []")
     project.tells("", "stripes: the key `stripes` is not known; did you mean `strips`?", alone=True)
 
 
@@ -113,7 +114,7 @@ def test_methods_that_need_strips_are_refused(tmp_path: Path) -> None:
 def test_a_drift_of_photos_in_no_order_needs_times(tmp_path: Path) -> None:
     project = with_photos(tmp_path, "{camera: RC30}")
     positions = "camera_positions: {file: gnss.csv, crs: local, axes: [east, north, up], sigma: [1, 1, 1]}\ncontrol:"
-    project.change("project.yaml", "control:", positions.replace("]}", "], correction: drift}"), "EPSG:32633", "local")
+    project.change(Y, "control:", positions.replace("]}", "], correction: drift}"), "EPSG:32633", "local")
     project.write("gnss.csv", "photo,x,y,z\n1001,1,2,3\n1002,1,2,3\n")
     message = "camera_positions.correction: a drift of photos in no given order needs times"
     project.tells("", message, "; fill its column time, or write `correction: offset`", alone=True)
@@ -126,7 +127,7 @@ def test_check_counts_photos_in_no_order_and_names_one_that_hangs_on_nothing(
 ) -> None:
     project = with_photos(tmp_path, "{camera: RC30}", STRIPS.replace(SECOND, ""))
     more = "".join(f"{photo},N{n},{10 * n},{n * n}\n" for photo in ("1001", "1002", "2001") for n in range(8))
-    project.write("observations.csv", OBSERVATIONS + more)
+    project.write(P, OBSERVATIONS + more)
     assert main(["check", str(tmp_path / "project.yaml"), "--format", "json"]) == 2
     (found,) = json.loads(capsys.readouterr().out)["projects"]
     assert found["counts"]["strips"] == 1

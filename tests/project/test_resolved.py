@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.project.samples import FILES, MARKED_FILES, Sample, sample
+from tests.project.samples import FILES, MARKED_FILES, P, Sample, Y, sample
 
 EXPECTED = """\
 # A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.
@@ -120,8 +120,8 @@ def test_it_is_the_same_project(tmp_path: Path, variant: str) -> None:
     files = MARKED_FILES if variant.startswith("marks") else FILES
     first, second = sample(tmp_path / "a", files), sample(tmp_path / "b", files)
     for old, new in VARIANTS[variant]:
-        first.change("project.yaml", old, new)
-    second.write("project.yaml", first.load().resolved)
+        first.change(Y, old, new)
+    second.write(Y, first.load().resolved)
     one, two = first.load(), second.load()
     assert (one.settings, one.resolved) == (two.settings, two.resolved)
     for name in ("name", "strips", "frames", "output"):
@@ -136,7 +136,7 @@ def test_it_is_the_same_project(tmp_path: Path, variant: str) -> None:
 
 def test_presets_and_overrides_are_in_it(project: Sample) -> None:
     project.write("preset.yaml", "processing: {refraction: true}\n")
-    project.change("project.yaml", "name: sample", "extends: preset.yaml")
+    project.change(Y, "name: sample", "extends: preset.yaml")
     resolved = project.load(["processing.relative.grubbs_alpha=1e-7"]).resolved
     assert "extends" not in resolved
     assert "  refraction: true\n" in resolved
@@ -148,7 +148,7 @@ def test_it_does_not_depend_on_the_place(tmp_path: Path, monkeypatch: pytest.Mon
     texts = set()
     for name in ("a", "b"):
         project = sample(tmp_path / name)
-        project.change("project.yaml", "file: observations.csv", f"file: {tmp_path / name / 'observations.csv'}")
+        project.change(Y, "file: observations.csv", f"file: {tmp_path / name / 'observations.csv'}")
         texts.add(project.load().resolved)
         monkeypatch.chdir(tmp_path / name)
         texts.add(project.load().resolved)
@@ -159,7 +159,7 @@ def test_other_programs_read_the_same_from_it(project: Sample) -> None:
     text = (
         (project.folder / "project.yaml").read_text(encoding="utf-8").replace("RC30", "0123").replace("id: B", "id: NO")
     )
-    project.write("project.yaml", text)
+    project.write(Y, text)
     read = yaml.safe_load(project.load().resolved)
     assert list(read["cameras"]) == ["0123"]
     assert [strip["id"] for strip in read["strips"]] == ["A", "NO"]
@@ -171,9 +171,9 @@ def test_other_programs_read_the_same_from_it(project: Sample) -> None:
 def test_long_lists_of_photos_are_broken_into_lines(project: Sample) -> None:
     names = [f"photo-{number:04d}" for number in range(200)]
     rows = "".join(f"{name},P,1,2\n" for name in names)
-    project.change("project.yaml", "[1001, 1002]", f"[{', '.join(names)}]")
+    project.change(Y, "[1001, 1002]", f"[{', '.join(names)}]")
     text = (project.folder / "observations.csv").read_text(encoding="utf-8")
-    project.write("observations.csv", text + rows)
+    project.write(P, text + rows)
     resolved = project.load().resolved
     assert max(map(len, resolved.splitlines())) <= 110
     assert yaml.safe_load(resolved)["strips"][0]["photos"] == names

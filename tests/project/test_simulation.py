@@ -2,6 +2,7 @@
 
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -88,10 +89,6 @@ def messages(folder: Path, text: str, *overrides: str) -> list[str]:
     return [str(fault).removeprefix(f"{folder}/") for fault in caught.value.faults]
 
 
-def test_an_empty_specification_is_the_default(tmp_path: Path) -> None:
-    assert specification(tmp_path, "photostrip_simulation: 1\n").spec == Spec()
-
-
 def test_every_key_reaches_its_field(tmp_path: Path) -> None:
     spec = specification(tmp_path, EVERYTHING).spec
     distortion = Distortion("brown", "ideal_to_image", (1e-8, 0.0, 0.0), (0.0, 1e-7))
@@ -119,13 +116,16 @@ def test_every_key_reaches_its_field(tmp_path: Path) -> None:
     assert changed == []
 
 
-def test_a_part_without_values_is_the_part_with_its_defaults(tmp_path: Path) -> None:
-    spec = specification(tmp_path, "photostrip_simulation: 1\nfilm:\ngnss: {}\ncamera: {preset: digital}\n").spec
-    assert (spec.film, spec.gnss, spec.camera) == (Film(), Gnss(), DIGITAL)
-
-
-def test_one_word_says_how_all_control_is_given(tmp_path: Path) -> None:
-    assert specification(tmp_path, "photostrip_simulation: 1\ncontrol: {use: z}\n").spec.control.use == {"z": 1.0}
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", {}),
+        ("film:\ngnss: {}\ncamera: {preset: digital}\n", {"film": Film(), "gnss": Gnss(), "camera": DIGITAL}),
+        ("control: {use: z}\n", {"control": Control(use={"z": 1.0})}),  # one word says how all control is given
+    ],
+)
+def test_what_is_not_said_is_the_default(tmp_path: Path, text: str, expected: dict[str, Any]) -> None:
+    assert specification(tmp_path, f"photostrip_simulation: 1\n{text}").spec == Spec(**expected)
 
 
 def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
@@ -137,56 +137,49 @@ def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "where", "what"),
+    ("text", "told"),
     [
-        ("fligth: {photos: 3}", "2:1: fligth", "the key `fligth` is not known; did you mean `flight`?"),
-        ("flight: {heading: 3}", "2:10: flight.heading", "the key `heading` is not known; did you mean `heading_deg`?"),
-        ("flight: {photos: 2.5}", "2:18: flight.photos", "2.5 is not a whole number; expected a whole number"),
-        ("flight: 3", "2:9: flight", "a single value is given here; expected a mapping (lines `key: value`)"),
-        ("control: {sigma: [1, 2]}", "2:18: control.sigma", "2 values in the list; expected 3 values"),
+        ("fligth: {photos: 3}", "2:1: fligth: the key `fligth` is not known; did you mean `flight`?"),
+        ("flight: {heading: 3}", "2:10: flight.heading: the key `heading` is not known; did you mean `heading_deg`?"),
+        ("flight: {photos: 2.5}", "2:18: flight.photos: 2.5 is not a whole number; expected a whole number"),
+        ("flight: 3", "2:9: flight: a single value is given here; expected a mapping (lines `key: value`)"),
+        ("control: {sigma: [1, 2]}", "2:18: control.sigma: 2 values in the list; expected 3 values"),
         (
             "camera: {preset: fil}",
-            "2:18: camera.preset",
-            "`fil` is no preset; expected one of film, digital; did you mean `film`?",
+            "2:18: camera.preset: `fil` is no preset; expected one of film, digital; did you mean `film`?",
         ),
         (
             "gross_errors: [{count: 1}]",
-            "2:16: gross_errors[0].kind",
-            "`kind` is missing; expected `image`, `control` or `swap`",
+            "2:16: gross_errors[0].kind: `kind` is missing; expected `image`, `control` or `swap`",
         ),
-        ("refraction: perhaps", "2:13: refraction", "`perhaps` is neither true nor false; expected true or false"),
-        ("flight: {photos: 0}", "2:18: flight.photos", "0 photos cannot make a strip; expected two or more"),
-        ("control: {use: {xz: 1}}", "2:21: control.use.xz", "'xz' is no set of coordinates; expected xyz | xy | z"),
+        ("refraction: perhaps", "2:13: refraction: `perhaps` is neither true nor false; expected true or false"),
+        ("flight: {photos: 0}", "2:18: flight.photos: 0 photos cannot make a strip; expected two or more"),
+        ("control: {use: {xz: 1}}", "2:21: control.use.xz: 'xz' is no set of coordinates; expected xyz | xy | z"),
         (
             "gross_errors:\n  - {kind: image, axis: z}",
-            "3:25: gross_errors[0].axis",
-            "an error of kind image has no axis 'z'; expected x | y",
+            "3:25: gross_errors[0].axis: an error of kind image has no axis 'z'; expected x | y",
         ),
         (
             "ground: {height: orthometric}",
-            "2:18: ground.height",
-            "EPSG:32633 with orthometric heights does not say how high",
+            "2:18: ground.height: EPSG:32633 with orthometric heights does not say how high",
         ),
         (
             "control: {second_crs: EPSG:0}",
-            "2:23: control.second_crs",
-            "PROJ does not know the coordinate reference system 'EPSG:0'",
+            "2:23: control.second_crs: PROJ does not know the coordinate reference system 'EPSG:0'",
         ),
         (
             "ground: {center_deg: [106, 8]}",
-            "2:22: ground.center_deg",
-            "strips around longitude, latitude 106, 8 cannot be given in EPSG:32633",
+            "2:22: ground.center_deg: strips around longitude, latitude 106, 8 cannot be given in EPSG:32633",
         ),
         (
             "control: {second_crs: EPSG:32634, boundary_longitude_deg: 3}",
-            "2:59: control.boundary_longitude_deg",
-            "all given points lie east of the boundary at 3 degrees; put it between them",
+            "2:59: control.boundary_longitude_deg: all given points lie east of the boundary at 3 degrees; put it",
         ),
-        ("flight: {attitude_sigma_deg: [9, 9, 9], photos: 30}", "2:9: flight", "no point lies on photos 1"),
+        ("flight: {attitude_sigma_deg: [9, 9, 9], photos: 30}", "2:9: flight: no point lies on photos 1"),
     ],
 )
-def test_faults_have_their_place(text: str, where: str, what: str, tmp_path: Path) -> None:
-    assert messages(tmp_path, f"photostrip_simulation: 1\n{text}\n")[0].startswith(f"spec.yaml:{where}: {what}")
+def test_faults_have_their_place(text: str, told: str, tmp_path: Path) -> None:
+    assert messages(tmp_path, f"photostrip_simulation: 1\n{text}\n")[0].startswith(f"spec.yaml:{told}")
 
 
 @pytest.mark.parametrize(

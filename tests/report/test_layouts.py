@@ -10,7 +10,6 @@ import yaml
 
 import photostrip
 from photostrip.cli.main import main
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -68,9 +67,6 @@ def written(folder: Path, specification: dict[str, Any], changed: dict[str, Any]
     return project
 
 
-SAMPLES = sorted(path.parent.name for path in ROOT.glob("sample_data/*/project.yaml"))
-
-
 def check_reports(result: photostrip.Result, folder: Path) -> None:
     """Write a result with its page, and print it again from its file in every form."""
     assert "report.html" in result.write(folder, html=True)
@@ -86,12 +82,6 @@ def test_every_layout_is_reported(tmp_path: Path, layout: str) -> None:
     result = photostrip.run(written(tmp_path, *LAYOUTS[layout]))
     assert (result.status == "failed") == (layout == "failed")
     check_reports(result, tmp_path / "result")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sample", SAMPLES)
-def test_every_sample_is_reported(tmp_path: Path, sample: str) -> None:
-    check_reports(photostrip.run(ROOT / "sample_data" / sample / "project.yaml"), tmp_path)
 
 
 def wrong(*_: object) -> None:

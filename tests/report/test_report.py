@@ -13,22 +13,18 @@ from scipy import stats
 from photostrip.errors import InputError
 from photostrip.formats.result_json import checked, to_json
 from photostrip.library.result import Result
-from photostrip.report.page.layout import cells, to_markdown, to_text
+from photostrip.report.page.layout import to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 from photostrip.report.sections.accuracy_report import chosen_sections, sections_of, title_of
 from photostrip.result.table import Table as ResultTable
 from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
-from tests.results import FRAMES, case, in_tables
+from tests.results import case, in_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tests.results import Document
-
-
-def printed(document: Document, width: int = 100) -> str:
-    return to_text(title_of(document), sections_of(document), width)
 
 
 def changed(**keys: object) -> Document:
@@ -82,19 +78,6 @@ def test_the_saved_result_has_the_keys_of_a_fresh_one() -> None:
 # ------------------------------------------------------------------------------------------------ from the file
 
 
-@pytest.mark.parametrize("width", [60, 80, 140, 200])
-@pytest.mark.parametrize("frame", FRAMES)
-def test_no_line_is_wider_than_the_page(frame: str, width: int) -> None:
-    assert max(cells(line) for line in printed(case(frame).document, width).splitlines()) <= width
-
-
-@pytest.mark.parametrize("key", ["strips", "models", "photos", "verdict", "status", "frame"])
-@pytest.mark.parametrize("value", [None, 1, "text", [{}]])
-def test_a_file_with_something_else_in_it_is_refused_in_words(key: str, value: object) -> None:
-    with pytest.raises(InputError, match=r"small: cannot be reported|result\.json: "):
-        reported(json.loads(to_json(saved() | {key: value})))
-
-
 @pytest.mark.parametrize("key", sorted(saved().keys() - {"polynomial_terms", "polynomial_evidence"}))
 def test_an_incomplete_file_is_refused_in_words(key: str) -> None:
     document = json.loads(to_json(case("projected").document))
@@ -133,23 +116,6 @@ def test_every_number_of_a_table_has_its_unit() -> None:
     for found in nonempty(sections_of(saved())):
         for table in tables(found):
             assert all(c.unit or c.left or c.name in without for c in table.columns), found.title
-
-
-def test_numbers_are_those_of_the_result() -> None:
-    document = case("north first", 2).document
-    (table,) = tables(section(document, "Check points"))
-    rows = [row for row in document["control"] if row["role"] == "check"]
-    points, tested = (
-        {row["id"]: row for row in found} for found in (document["points"], document["precision"]["check"]["points"])
-    )
-    for shown, row in nonempty(zip(table.rows, rows, strict=True)):
-        point, z = points[row["id"]], tested[row["id"]]
-        assert shown[:-2] == (
-            row["id"], *(f"{row[key]:+.3f}" for key in ("dx", "dy", "dz")),
-            *(f"{point[key]:.3f}" for key in ("sigma_x", "sigma_y", "sigma_z")),
-            f"{z['plan']:.2f}", f"{100 * z['p_plan']:.1f}", f"{z['height']:.2f}", f"{100 * z['p_height']:.1f}",
-        )  # fmt: skip
-    assert table.foot[0][1:4] == tuple(f"{document['summary']['check_rms'][axis]:.3f}" for axis in "xyz")
 
 
 def test_the_probability_of_a_check_point_is_that_of_its_difference() -> None:

@@ -13,6 +13,7 @@ import pytest
 import photostrip
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.result import pictures_of
+from photostrip.report.pictures.svg import Picture
 from photostrip.result.bundle import bundle_of
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Points, Spec
 from tests.loops import nonempty
@@ -88,23 +89,23 @@ def test_what_was_used_lies_within_the_limits_and_what_was_rejected_beyond(scree
         assert abs(row["parallax_um"]) > size[row["photo"], row["other_photo"]]
 
 
-def test_without_a_search_there_is_no_limit() -> None:
-    found = run("none").document
-    assert set(limits(found)) == {None}
-    drawn = next(each for each in pictures_of(found) if each.name == "histogram")
-    assert "limit" not in drawn.svg
+def histogram(document: Document) -> Picture:
+    return next(each for each in pictures_of(document) if each.name == "histogram")
 
 
-def test_the_histogram_has_the_limits() -> None:
+def test_the_histogram_has_the_limits_and_none_without_a_search() -> None:
+    unsearched = run("none").document
+    assert set(limits(unsearched)) == {None}
+    assert "limit" not in histogram(unsearched).svg
     document = case().document
-    drawn = next(each for each in pictures_of(document) if each.name == "histogram")
+    drawn = histogram(document)
     known = sorted(each for each in limits(document) if each is not None)
     middle = float(np.median(known))
     assert f"median limit ±{middle:.1f} µm" in drawn.svg
     assert f"{known[0]:.1f} to {known[-1]:.1f} µm" in drawn.caption
     assert drawn.svg.count('class="line failed dashed"') == 3  # two in the panel of the y parallaxes, one in the legend
     bundle = solved(case().inputs, Settings(adjustment="bundle")).document
-    of_bundle = next(each for each in pictures_of(bundle) if each.name == "histogram")
+    of_bundle = histogram(bundle)
     assert f"±{bundle['bundle']['screening']['limit']:.2f}" in of_bundle.svg
     assert "y parallaxes" not in of_bundle.svg
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 
 from photostrip.cli.main import main
 from photostrip.errors import InputError
@@ -78,11 +79,9 @@ def result(name: str) -> Document:
         return read_baseline(str(baseline(name))) | {"version": ""}
     if name == "models":
         return solved(inputs_of(simulate(replace(spec(), models=Models())))).document
-    return (
-        solved(case("projected", 2).inputs, Settings(adjustment="bundle")).document
-        if name == "bundle"
-        else case(name, 2).document
-    )
+    if name == "bundle":
+        return solved(case("projected", 2).inputs, Settings(adjustment="bundle")).document
+    return case(name, 2).document
 
 
 @pytest.mark.slow
@@ -162,7 +161,7 @@ def test_a_table_gives_columns_and_rows_and_comes_back_from_json() -> None:
 
 
 SCHEMA = result_schema()
-VALIDATOR = pytest.importorskip("jsonschema").Draft202012Validator(SCHEMA)
+VALIDATOR = Draft202012Validator(SCHEMA)
 
 
 def against_schema(document: dict[str, Any]) -> list[str]:
@@ -182,7 +181,7 @@ def against_schema(document: dict[str, Any]) -> list[str]:
         (("photostrip_result",), 1, "$.photostrip_result: 2 was expected"),
     ],
 )
-def test_an_edited_result_does_not(keys: tuple[str | int, ...], value: object, block: str) -> None:
+def test_an_edited_result_does_not_keep_the_schema(keys: tuple[str | int, ...], value: object, block: str) -> None:
     document = deepcopy(plain_of(case().document))
     part = document
     for key in keys[:-1]:
@@ -266,15 +265,9 @@ def test_values_are_of_their_kind(column: str, values: str, right: bool) -> None
     assert (refused(f'{{"tolerances": {{{text}}}}}') == []) is right
 
 
-@pytest.mark.parametrize(("count", "right"), [("999999999999999", True), ("1000000000000001", False), ("2.0", False)])
-def test_counts_are_whole_numbers(count: str, right: bool) -> None:
-    assert ("counts.photos" not in refused(f'{{"counts": {{"photos": {count}}}}}')) is right
-
-
-def test_a_whole_result_has_every_block() -> None:
-    with pytest.raises(InputError) as caught:
-        read({"name": "a"}, "result.json")
-    assert {"version", "status", "verdict"} <= {fault.key for fault in caught.value.faults}
+def test_counts_are_whole_numbers() -> None:
+    for count, right in (("999999999999999", True), ("1000000000000001", False), ("2.0", False)):
+        assert ("counts.photos" not in refused(f'{{"counts": {{"photos": {count}}}}}')) is right, count
 
 
 @given(st.lists(st.text("ab-_. 0019\n\0é", max_size=6)))

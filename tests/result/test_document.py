@@ -268,7 +268,7 @@ def test_the_summary_is_that_of_the_rows(role: str) -> None:
         assert summary[role][part]["rms_um"] == pytest.approx(math.sqrt(np.mean(squares)), abs=0.1)
 
 
-def test_micrometres_at_photo_scale() -> None:
+def test_micrometres_at_photo_scale_and_the_ratio_of_point_and_model() -> None:
     document = case("local").document
     (strip,) = document["strips"]
     for row in nonempty(document["control"]):
@@ -276,11 +276,6 @@ def test_micrometres_at_photo_scale() -> None:
     f = case("local").inputs.strips[0].camera.principal_distance / 1000
     assert strip["photo_scale"] == pytest.approx(strip["flying_height"] / f, abs=0.1)
     assert strip["photo_scale"] == pytest.approx(10_000, rel=0.03)
-
-
-def test_the_ratio_counts_the_point_and_the_model() -> None:
-    document = case("local").document
-    strip = document["strips"][0]
     for row in nonempty(document["control"]):
         point = (strip["precision_plan"], strip["precision_plan"], strip["precision_height"])
         expected = [math.hypot(row[f"sigma_{k}"], size) for k, size in enumerate(point, 1)]

@@ -151,14 +151,6 @@ def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     assert both["accuracy"].endswith("m in plan with K01, K02")
 
 
-def test_a_check_point_that_is_known_badly_does_not_stand_out() -> None:
-    """Far off beside the others, and 1.3 times its own standard deviation: at the end of a long strip, say."""
-    values = np.array([0.1, -0.05, 0.08, 0.02, -0.07, 1.04])
-    expected = np.array([0.9, 0.9, 0.9, 0.9, 0.9, 0.19])
-    assert not stand_out(values, 1, expected).any()
-    assert stand_out(values, 1, np.where(values > 1, 1e-4, expected)).tolist() == [False] * 5 + [True]
-
-
 PLACE: Document = {"file": "", "line": 0, "column": 0, "key": "", "photos": []}
 
 
@@ -184,13 +176,18 @@ def test_a_wrong_point_is_told_once_with_what_became_of_it() -> None:
     assert verdict_of(in_tables(changed))["look_at"] == expected
 
 
-def test_wrong_check_points_do_not_hide_each_other() -> None:
+def test_wrong_check_points_do_not_hide_each_other_and_one_known_badly_does_not_stand_out() -> None:
     values = np.array([0.1, 447.0, -0.05, 0.08, 447.2, 0.02, -0.07, 0.11])
     found = stand_out(values, 1, np.full(8, 1e-9))
     assert np.flatnonzero(found).tolist() == [1, 4]
     assert not stand_out(values, 1, np.full(8, 0.05)).any()  # nothing beyond its standard deviation
     assert not stand_out(np.array([np.nan, 5.0]), 1, np.full(2, 1e-9)).any()
     assert stand_out(np.array([447.0, 0.088]), 2, np.full(2, 1e-9)).tolist() == [True, False]
+    # far off beside the others, and 1.3 times its own standard deviation: at the end of a long strip, say
+    values = np.array([0.1, -0.05, 0.08, 0.02, -0.07, 1.04])
+    expected = np.array([0.9, 0.9, 0.9, 0.9, 0.9, 0.19])
+    assert not stand_out(values, 1, expected).any()
+    assert stand_out(values, 1, np.where(values > 1, 1e-4, expected)).tolist() == [False] * 5 + [True]
 
 
 @pytest.mark.slow

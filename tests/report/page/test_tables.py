@@ -16,7 +16,6 @@ from photostrip.report.html import to_html
 from photostrip.report.page.parts import DASH, Column, Table
 from photostrip.report.page.tables import Field, keyed, tabulated
 from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.result.bundle import kinds
 from photostrip.result.table import Table as ResultTable
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
@@ -128,11 +127,6 @@ def test_the_page_has_no_other_unit(adjustment: str) -> None:
     page = to_html(document("gon", adjustment))
     assert "gon" in page
     assert re.findall(r"\bdeg\b|″", page) == []
-
-
-@pytest.mark.parametrize(("unit", "size"), [("deg", 180 / np.pi), ("gon", 200 / np.pi), ("rad", 1.0)])
-def test_errors_of_attitudes_have_the_unit(unit: str, size: float) -> None:
-    assert (kinds(unit)["attitude"].unit, kinds(unit)["attitude"].factor) == (unit, size)
 
 
 def test_the_grid_convergence_of_a_check_has_the_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,7 +24,6 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Gnss
 from tests.foreign.colmap_models import SPEC
 from tests.loops import nonempty
-from tests.reports import saved
 from tests.results import by_rows, in_tables, rotation
 from tests.simulated import inputs_of, settings_of
 
@@ -195,14 +194,6 @@ def test_a_mark_beside_its_point_stands_first_in_the_short_report(block: Documen
     assert float(x) == pytest.approx(30.0, abs=2.0)
     assert "more marks: --section marks" in table.note
     assert "Marks of given points" in to_html(block)
-
-
-def test_marks_of_film_are_shown_in_micrometres() -> None:
-    (section,) = chosen_sections(saved(), names=["marks"])
-    (table,) = (part for part in section.parts if isinstance(part, Table))
-    assert table.rows
-    assert [column.unit for column in table.columns if column.name.startswith("v ")] == ["µm", "µm"]
-    assert "gsd" not in saved()["summary"]
 
 
 def test_the_ground_that_a_pixel_covers_is_that_of_depth_and_principal_distance(block: Document) -> None:
