@@ -244,8 +244,9 @@ def test_projects_may_move_together_with_their_results(here: Path, call: Call) -
 def test_wrong_usage_is_told(here: Path, call: Call, arguments: list[str], message: str) -> None:
     (here / "empty").mkdir()
     (here / "file.txt").write_text("x", encoding="utf-8")
-    code, _, err = call("batch", *arguments)
+    code, out, err = call("batch", *arguments)
     assert (code, message in err) == (2, True)
+    assert "dask:nonsense" in arguments or out == ""
 
 
 def test_a_batch_that_nobody_computes_says_so(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -51,13 +50,13 @@ def renamed(folder: Path, target: Path) -> tuple[dict[str, str], dict[str, str]]
     target.mkdir()
     (target / "project.yaml").write_text(yaml.safe_dump(project, allow_unicode=True), encoding="utf-8")
     for name, table in tables.items():
-        stream = io.StringIO()
-        writer = csv.DictWriter(stream, list(table[0]))
-        writer.writeheader()
-        for row in table:
-            changed = {"point": points[row["point"]]} | ({"photo": photos[row["photo"]]} if "photo" in row else {})
-            writer.writerow(row | changed)
-        (target / name).write_text(stream.getvalue(), encoding="utf-8", newline="")
+        new = {"point": points, "photo": photos}
+        with (target / name).open("w", encoding="utf-8", newline="") as stream:
+            writer = csv.DictWriter(stream, list(table[0]))
+            writer.writeheader()
+            writer.writerows(
+                {key: new[key][cell] if key in new else cell for key, cell in row.items()} for row in table
+            )
     return photos, points
 
 

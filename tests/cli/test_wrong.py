@@ -94,8 +94,9 @@ def test_a_cause_in_the_data_is_told_before_what_comes_of_it(tmp_path: Path, cal
     first, second = err.splitlines()
     assert "P201 strip A: photos 1003 and 1002 are listed in the wrong order" in first
     assert second.startswith("error: relative orientation of photos 1001 and 1003")
-    _, printed, _ = call("run", path, *order, "--format", "json")
-    assert json.loads(printed)["findings"][0]["code"] == "P201"
+    code, printed, err = call("run", path, *order, "--format", "json")
+    document = json.loads(printed)
+    assert (code, err, document["exit_code"], document["findings"][0]["code"]) == (3, "", 3, "P201")
 
 
 @pytest.mark.parametrize(("old", "new"), [("unit: mm", "unti: mm"), ("observations:", "observatons:")])

@@ -355,9 +355,6 @@ def test_the_picture_of_a_strip(answer: Answer, call: Call, tmp_path: Path) -> N
     assert (found, "nothing is written as '.svg'" in err) == (2, True)
 
 
-# -------------------------------------------------------------------------------------------------- displacements
-
-
 def test_displacements_from_one_station(answer: Answer) -> None:
     assert "one, distances known" in answer("plan", "displacement", "--set=camera=UMK 10/1318", "--set=stations=1")
 

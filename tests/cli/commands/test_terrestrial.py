@@ -145,8 +145,13 @@ def test_rounds_of_every_theodolite_for_the_stricter_end_of_the_base(answer: Ans
     assert {row["theodolite"]: row["rounds"] for row in one["rounds"]}["T2"] == 2  # (2 / 1.896)^2 = 1.1
 
 
-def test_a_theodolite_may_be_worse_in_height(said: Said) -> None:
-    text = said("theodolite", UMK, "sigma_arcsec=2", "rounds=4", "vertical_arcsec=6")
+def test_a_theodolite_may_be_worse_in_height(said: Said, answer: Answer) -> None:
+    command = ("theodolite", UMK, "sigma_arcsec=2", "rounds=4")
+    found = answer(*command, "sigma_um=0.5")
+    supported = {"by_horizontal": 0.878, "by_vertical": 0.6856, "by_both": 0.878}
+    assert found["supported_um"] == pytest.approx(supported, abs=1e-3)
+    assert (found["wanted"]["rounds_horizontal"], found["wanted"]["rounds_vertical"]) == (13, 8)
+    text = said(*command, "vertical_arcsec=6")
     assert "supports in the photo  2.06 µm everywhere (horizontal 0.88, vertical 2.06)" in text
 
 
@@ -398,9 +403,6 @@ def test_a_point_without_a_displacement_has_a_reason_in_every_form(tmp_path: Pat
     assert re.search(r"^P7 +– .* not measured$", text, re.MULTILINE)
 
 
-# --------------------------------------------------------------------------------------------------------- pictures
-
-
 def texts(svg: bytes) -> str:
     root = ET.fromstring(svg)  # noqa: S314 (our own file)
     return " ".join(" ".join(each.itertext()) for each in root.iter("{http://www.w3.org/2000/svg}text"))
@@ -522,6 +524,7 @@ def test_displacements_from_one_station(tmp_path: Path, answer: Answer) -> None:
     found = answer(*arguments, f"table={table}")
     point = {each["point"]: each for each in found["points"]}
     assert [each["components"] for each in found["points"]] == [2, 2, 2, 2, 3, 2]
+    assert point["1"]["significant"]
     # 0.042 mm more than the turned camera moves it, at 110 m and f = 100 mm
     assert point["2"]["dx"] == pytest.approx(0.046, abs=0.002)
     micro = tmp_path / "micro.csv"
