@@ -31,9 +31,9 @@ def exit_code_of(error: BaseException, *, debug: bool) -> int:
     while hidden.__context__ is not None and not isinstance(error, KeyboardInterrupt):
         hidden = hidden.__context__
         error = hidden if isinstance(hidden, KeyboardInterrupt) else error
+    if isinstance(error, OSError):
+        _drop_unwritten()
     if isinstance(error, BrokenPipeError):
-        # what is still in the buffer has no reader; without this the interpreter complains when it ends
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_BROKEN_PIPE
     if debug:
         import traceback
@@ -60,6 +60,14 @@ def exit_code_of(error: BaseException, *, debug: bool) -> int:
         lines = lines_of(findings_of(error))
     sys.stderr.writelines(f"{line}\n" for line in lines)
     return code
+
+
+def _drop_unwritten() -> None:
+    """Forget what stdout cannot take (no reader, no room): else the interpreter ends with a complaint and code 120."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def as_fault(error: OSError) -> InputError:

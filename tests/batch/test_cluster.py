@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import socket
 import subprocess
 import sys
@@ -56,8 +57,7 @@ def started(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
 def free_port() -> int:
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
-        port: int = one.getsockname()[1]
-        return port
+        return int(one.getsockname()[1])
 
 
 @contextmanager
@@ -115,16 +115,15 @@ def test_all_executors_write_the_same_bytes(tmp_path: Path, cluster: str) -> Non
     """One process, two processes, a cluster; a fault, a preset beside the projects and an absolute path among them."""
     projects = write_projects(tmp_path / "strips", 4)
     (tmp_path / "preset.yaml").write_text("processing: {relative: {grubbs_alpha: 0.02}}\n", encoding="utf-8")
-    for n, change in (
-        (1, ("photostrip: 1", "photostrip: 1\nextends: ../../preset.yaml")),
-        (2, ("control.csv", "none.csv")),
-    ):
-        path = Path(projects[n])
-        path.write_text(path.read_text(encoding="utf-8").replace(*change), encoding="utf-8")
-    text = Path(projects[3]).read_text(encoding="utf-8")
     elsewhere = tmp_path / "elsewhere.csv"
     (tmp_path / "strips" / "s4" / "control.csv").rename(elsewhere)
-    Path(projects[3]).write_text(text.replace("control.csv", str(elsewhere)), encoding="utf-8")
+    for n, old, new in (
+        (1, "photostrip: 1", "photostrip: 1\nextends: ../../preset.yaml"),
+        (2, "control.csv", "none.csv"),
+        (3, "control.csv", str(elsewhere)),
+    ):
+        path = Path(projects[n])
+        path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     ways = {"one": ("-j", "1"), "two": ("-j", "2"), "dask": ("--executor", f"dask:{cluster}")}
     told = {way: run(tmp_path, "strips", "-o", way, *options) for way, options in ways.items()}
     assert {way: done.returncode for way, done in told.items()} == dict.fromkeys(ways, 2)
@@ -143,9 +142,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
     names = ("segfault", "hang", "memory", "good")
     write_projects(tmp_path, 1)
     for name in names:
-        (tmp_path / "strips" / name).mkdir(parents=True)
-        for path in (tmp_path / "s1").iterdir():
-            (tmp_path / "strips" / name / path.name).write_bytes(path.read_bytes())
+        shutil.copytree(tmp_path / "s1", tmp_path / "strips" / name)
     monkeypatch.chdir(tmp_path)
     statuses: dict[str, str] = {}
 
@@ -181,8 +178,7 @@ def test_machines_come_and_go(tmp_path: Path) -> None:
             middle.kill()
             out, err = process.communicate(timeout=60.0)
     assert process.returncode == 2
-    assert "the connection to the cluster is lost" in err
-    assert "Traceback" not in err
+    assert ("the connection to the cluster is lost" in err, "Traceback" in err) == (True, False)
     assert re.search(rf"{number} projects: \d+ not run, \d+ good", out)
     assert run(tmp_path, "strips", "-o", "out", "-q").returncode == 0
     assert run(tmp_path, "strips", "-o", "whole", "-q").returncode == 0

@@ -84,9 +84,6 @@ def test_memory_is_shared_evenly() -> None:
     assert share_of_memory(1) > 100.0
 
 
-# ------------------------------------------------------------------------------------------------- the work
-
-
 @pytest.mark.parametrize(("error", "status"), [(ZeroDivisionError("by zero"), "crashed"), (MemoryError(), "memory")])
 def test_an_error_of_the_work_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception, status: str

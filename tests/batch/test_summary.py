@@ -88,9 +88,6 @@ def test_what_is_no_record_is_not_taken_for_one(content: bytes) -> None:
     assert parsed_record(content) is None
 
 
-# ------------------------------------------------------------------------------------------------- meanwhile
-
-
 def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
     stream = io.StringIO()
     with progress(stream, 2, patience=0.0) as shown:

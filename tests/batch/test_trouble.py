@@ -119,9 +119,6 @@ def test_inputs_that_may_not_be_read_in_the_middle(here: Path) -> None:
     assert {path.name for path in (here / "out").iterdir() if path.is_dir()} == {"s1", "s5"}
 
 
-# ------------------------------------------------------------------------------------------------ two at once
-
-
 @pytest.mark.slow
 def test_a_second_batch_on_the_same_folder_is_refused(here: Path, call: Call) -> None:
     batch = ("batch", "strips", "-o", "out", "-q")

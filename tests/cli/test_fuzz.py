@@ -21,43 +21,33 @@ def right(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, bytes]]:
     return projects(tmp_path_factory.mktemp("right"))
 
 
-@pytest.mark.slow
-@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
-@given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
-def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, command: str) -> None:
-    case = damaged(right, Random(seed))
-    with tempfile.TemporaryDirectory() as folder:
-        assert tried(case, Path(folder), command).faults == (), case.done
-
-
 @pytest.fixture(scope="module")
 def right_blocks(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, bytes]]:
     return blocks(tmp_path_factory.mktemp("blocks"))
 
 
 @pytest.mark.slow
-@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
+@pytest.mark.parametrize("kind", ["right", "right_blocks"])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
-def test_a_damaged_block_ends_well(right_blocks: list[dict[str, bytes]], seed: int, command: str) -> None:
-    case = damaged(right_blocks, Random(seed))
+def test_what_is_damaged_ends_well(kind: str, request: pytest.FixtureRequest, seed: int, command: str) -> None:
+    case = damaged(request.getfixturevalue(kind), Random(seed))
     with tempfile.TemporaryDirectory() as folder:
         assert tried(case, Path(folder), command).faults == (), case.done
 
 
 @pytest.mark.parametrize(
-    ("seed", "command"),
+    "seed",
     [
-        ("9911 913", "run"),  # a header that stands twice: a photo in no strip without a row
-        ("9921 1312", "run"),  # suspected control was exchanged without end
-        ("9921 2150", "run"),  # variances below zero
+        "9911 913",  # a header that stands twice: a photo in no strip without a row
+        "9921 1312",  # suspected control was exchanged without end
+        "9921 2150",  # variances below zero
     ],
 )
-def test_projects_that_ended_badly_end_well(
-    right: list[dict[str, bytes]], tmp_path: Path, seed: str, command: str
-) -> None:
+def test_projects_that_ended_badly_end_well(right: list[dict[str, bytes]], tmp_path: Path, seed: str) -> None:
     """Cases of the benchmark."""
     case = damaged(right, Random(seed))
-    assert tried(case, tmp_path, command).faults == (), case.done
+    assert tried(case, tmp_path, "run").faults == (), case.done
 
 
 @pytest.mark.parametrize("command", ["check", "run"])

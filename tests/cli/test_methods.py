@@ -108,8 +108,7 @@ def test_where_no_bundle_can_be_had_it_is_the_polynomial_and_says_why(
 ) -> None:
     project = simulated(answer, tmp_path, FLAT)
     document = run(project, *UNDETERMINED)
-    assert document["adjustment"] == "polynomial"
-    assert document["settings"]["adjustment"] == "auto"
+    assert (document["adjustment"], document["settings"]["adjustment"]) == ("polynomial", "auto")
     assert len(document["polynomials"]) == 1
     (note,) = [each for each in document["notes"] if each["code"] == "no-bundle"]
     assert "self_calibration" in note["message"]
@@ -153,8 +152,7 @@ def test_a_free_network_from_the_command_line(answer: Answer, run: Run, tmp_path
     project = simulated(answer, tmp_path, BANDS)
     edit(project.with_name("control.csv"), lambda rows: [row.replace(",control", ",check") for row in rows])
     document = run(project, *BUNDLE)
-    assert document["bundle"]["free_network"] is True
-    assert document["frame"]["crs"] == "local"
+    assert (document["bundle"]["free_network"], document["frame"]["crs"]) == (True, "local")
     assert "free-network" in [note["code"] for note in document["notes"]]
 
 

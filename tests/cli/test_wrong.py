@@ -228,13 +228,17 @@ def test_a_full_disk_takes_the_same_form(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("closed", "name", "expected"), [(1, "project.yaml", 0), (2, "nothing.yaml", 2)])
-def test_an_output_that_the_caller_closed_takes_everything(
-    tmp_path: Path, closed: int, name: str, expected: int
+@pytest.mark.parametrize(
+    ("output", "name", "expected"),
+    [("1>&-", "project.yaml", 0), ("2>&-", "nothing.yaml", 2), (">/dev/full", "project.yaml", 2)],
+)
+def test_an_output_that_the_caller_closed_takes_everything_and_a_full_one_is_told(
+    tmp_path: Path, output: str, name: str, expected: int
 ) -> None:
-    """As ``photostrip check project.yaml >&-`` in a job that wants no output."""
+    """As ``photostrip check project.yaml >&-`` in a job that wants no output; what is short waits in a buffer."""
     path = write_project(tmp_path / "p", spec()).with_name(name)
-    command = f'exec "{sys.executable}" -m photostrip check "{path}" {closed}>&-'
+    command = f'exec env -u PYTHONUNBUFFERED "{sys.executable}" -m photostrip check "{path}" {output}'
     done = subprocess.run(["sh", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == expected
-    assert "internal" not in done.stdout + done.stderr
+    assert done.stderr == ("error: No space left on device\n" if "full" in output else "")
+    assert "internal" not in done.stdout

@@ -14,7 +14,7 @@ from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     Columns = dict[str, list[Any]]
@@ -107,39 +107,36 @@ def simulated() -> Sample:
     return Sample("simulated-20")
 
 
+def measured_thrice(sample: Sample) -> list[str]:
+    """Give the check points on three photos: of two, an x parallax is a height, which stands out."""
+    return [point for point in sample.given("check") if len(sample.images(point)) == 3]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("method", "axis"), [("polynomial", "x"), ("bundle", "y")])
-def test_a_wrong_image_of_control_is_told_whatever_it_costs(simulated: Sample, method: str, axis: str) -> None:
-    """One image of every other control point in turn: all lost their coordinates with x parallaxes, most under GOOD."""
-    size = MOVED if method == "bundle" else FOUND_IN_STRIP
-    for point in simulated.given("control")[::2]:
-        row = simulated.images(point)[0]
+@pytest.mark.parametrize(
+    ("points", "image", "method", "axis", "size"),
+    [
+        (lambda sample: sample.given("control")[::2], 0, "polynomial", "x", FOUND_IN_STRIP),
+        (lambda sample: sample.given("control")[::2], 0, "bundle", "y", MOVED),
+        (lambda sample: measured_thrice(sample)[::3], 1, "polynomial", "x", MOVED),
+        (lambda sample: measured_thrice(sample)[::3], 1, "bundle", "x", MOVED),
+        (lambda _: ["G07", "K01"], 0, "auto", "x", MOVED),
+        (lambda _: ["G07", "K01"], 0, "bundle", "x", MOVED),
+    ],
+)
+def test_a_wrong_image_of_a_given_point_is_told(
+    simulated: Sample, points: Callable[[Sample], list[str]], image: int, method: str, axis: str, size: float
+) -> None:
+    """One image of each in turn: many lost their coordinates, most under GOOD."""
+    for point in nonempty(points(simulated)):
+        row = simulated.images(point)[image]
         require_told(simulated.run(method, [(row, axis)], size), point, simulated.observations["photo"][row])
-
-
-@pytest.mark.parametrize("method", ["auto", "bundle"])
-def test_a_wrong_image_of_a_given_point_is_told(simulated: Sample, method: str) -> None:
-    """A control point and a check point on three photos each, from which both methods take a different way."""
-    for point in ("G07", "K01"):
-        row = simulated.images(point)[0]
-        require_told(simulated.run(method, [(row, "x")]), point, simulated.observations["photo"][row])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["polynomial", "bundle"])
-def test_a_check_point_that_is_lost_is_told(simulated: Sample, method: str) -> None:
-    """On three photos: of two, an x parallax is a height, which stands out."""
-    points = [point for point in simulated.given("check") if len(simulated.images(point)) == 3]
-    for point in nonempty(points[::3]):
-        row = simulated.images(point)[1]
-        require_told(simulated.run(method, [(row, "x")]), point, simulated.observations["photo"][row])
 
 
 @pytest.mark.parametrize("method", ["polynomial", "bundle"])
 def test_many_that_are_lost_are_all_named_on_the_first_page(simulated: Sample, method: str) -> None:
     """Never among so many more; what is lost of the control comes before all else."""
-    checks = [point for point in simulated.given("check") if len(simulated.images(point)) == 3]
-    points = ["G04", "G06", "G08", "G10", *checks]
+    points = ["G04", "G06", "G08", "G10", *measured_thrice(simulated)]
     document = simulated.run(method, [(simulated.images(point)[0], "x") for point in points])
     given = [row["id"] for row in document["control"]]
     concerned = [point for point in given if point in lost(document) or rejected_at(document, point)]

@@ -158,7 +158,7 @@ PHOTOS = ("1001", "1002", "2001", "2002")
 PLACES = np.array([[650000.0 + 900.0 * n, 4650000.0, 2000.0] for n in range(len(PHOTOS))])  # far from the meridian
 TRUE = Rotation.from_euler("XYZ", [[3, -4, 100], [-2, 5, 80], [1, 2, -175], [-85, 3, 20]], degrees=True)
 NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # east, north, up of north, east, down
-DOWN = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # ahead, right, down of image axes
+DOWN = NED  # ahead, right, down of image axes
 AHEAD = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # right is right, up is up, against the view
 
 START = "  role: approximate\n"

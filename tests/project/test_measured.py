@@ -13,7 +13,7 @@ from photostrip.points import PhotoPoints
 from photostrip.project.loading import Project, load_project
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec
-from tests.project.samples import CONTROL, FIDUCIALS, MARKED_FILES, OBSERVATIONS, C, P, Sample, Y, sample
+from tests.project.samples import CONTROL, FIDUCIALS, OBSERVATIONS, C, P, Sample, Y, sample
 
 PAIRS = """\
 pair,point,x,y,p,q
@@ -218,14 +218,12 @@ WAYS = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_the_same_image_points_come_of_it(tmp_path: Path, way: str) -> None:
+def test_the_same_image_points_come_of_it(project: Sample, way: str) -> None:
     text, said = WAYS[way]
-    expected = sample(tmp_path / "plain").load().inputs.observations
-    project = sample(tmp_path / "way")
+    usual = measured(project.load())
     project.write(P, text)
-    found = project.load([f"observations.{each}" for each in said]).inputs.observations
-    assert (found.photo_ids, found.point_ids) == (expected.photo_ids, expected.point_ids)
-    np.testing.assert_array_equal(found.xy, expected.xy)
+    found = measured(project.load([f"observations.{each}" for each in said]))
+    assert list(found.items()) == list(usual.items())
 
 
 def test_every_table_of_given_coordinates_can_be_written_so(tmp_path: Path) -> None:
@@ -255,9 +253,8 @@ def test_tables_of_cameras_can_be_written_so(project: Sample) -> None:
     text = (project.folder / "project.yaml").read_text(encoding="utf-8").partition("processing:")[0]
     project.write(Y, text + GIVEN)
     project.write("gnss.txt", "1001  500012.4  4649871.4  2012.3\n")
-    project.write(
-        "imu.txt", "Bild\tx\ty\tz\tQuerneigung\tomega\tkappa\n1001\t500012,4\t4649871,4\t2012,3\t9\t0,5\t90\n"
-    )
+    row = ["1001", "500012.4", "4649871.4", "2012.3", "9", "0.5", "90"]
+    project.write("imu.txt", written("\t", ["Bild", "x", "y", "z", "Querneigung", "omega", "kappa"], row, decimal=","))
     inputs = project.load().inputs
     assert inputs.positions is not None
     assert inputs.orientations is not None
@@ -265,36 +262,30 @@ def test_tables_of_cameras_can_be_written_so(project: Sample) -> None:
     np.testing.assert_array_equal(inputs.orientations.enu, [[500012.4, 4649871.4, 2012.3]])
 
 
-def test_several_files_are_one_table(tmp_path: Path) -> None:
-    expected = sample(tmp_path / "one").load().inputs.observations
-    project = sample(tmp_path / "several")
+def test_several_files_are_one_table(project: Sample) -> None:
+    usual = measured(project.load())
     turned = [[y, x, point, photo] for photo, point, x, y in ROWS[4:]]
     project.write("a.csv", written(",", HEADER, *ROWS[:4]))
     project.write("b.csv", written(",", ["y", "x", "point", "photo"], *turned))
     read = project.load(["observations.file=[a.csv, b.csv]"])
-    found = read.inputs.observations
-    assert (found.photo_ids, found.point_ids) == (expected.photo_ids, expected.point_ids)
-    np.testing.assert_array_equal(found.xy, expected.xy)
+    assert list(measured(read).items()) == list(usual.items())
     assert yaml.safe_load(read.resolved)["observations"]["file"] == ["a.csv", "b.csv"]
     assert [path.name for path in read.files] == ["project.yaml", "a.csv", "b.csv", "control.csv"]
 
 
-def test_several_files_of_pairs_and_of_marks(tmp_path: Path) -> None:
-    plain, project = sample(tmp_path / "one", MARKED_FILES), sample(tmp_path / "several", MARKED_FILES)
+def test_several_files_of_pairs_and_of_marks(marked: Sample) -> None:
+    one = marked.load()
     head, *rows = FIDUCIALS.splitlines(keepends=True)
-    project.write("a.csv", head + "".join(rows[:3]))
-    project.write("b.csv", head + "".join(rows[3:]))
+    marked.write("a.csv", head + "".join(rows[:3]))
+    marked.write("b.csv", head + "".join(rows[3:]))
     head, *rows = BOTH.splitlines(keepends=True)
-    project.write("c.csv", head + "".join(rows[:2]))
-    project.write("d.csv", head + "".join(rows[2:]))
-    one = plain.load().inputs
-    found = project.load(["fiducial_measurements.file=[a.csv, b.csv]", "observations.file=[c.csv, d.csv]"]).inputs
-    assert found.fiducials is not None
-    assert one.fiducials is not None
-    np.testing.assert_array_equal(found.fiducials.xy, one.fiducials.xy)
-    np.testing.assert_array_equal(
-        sorted(map(tuple, found.observations.xy.tolist())), sorted(map(tuple, one.observations.xy.tolist()))
-    )
+    marked.write("c.csv", head + "".join(rows[:2]))
+    marked.write("d.csv", head + "".join(rows[2:]))
+    found = marked.load(["fiducial_measurements.file=[a.csv, b.csv]", "observations.file=[c.csv, d.csv]"])
+    assert found.inputs.fiducials is not None
+    assert one.inputs.fiducials is not None
+    np.testing.assert_array_equal(found.inputs.fiducials.xy, one.inputs.fiducials.xy)
+    assert measured(found) == measured(one)
 
 
 @pytest.mark.parametrize(

@@ -35,11 +35,6 @@ def faults(path: Path, *overrides: str) -> list[str]:
     return [str(fault).replace(f"{path.parent}/", "") for fault in caught.value.faults]
 
 
-def tells(path: Path, expected: str) -> None:
-    told = faults(path)
-    assert any(each.startswith(expected) for each in told), told
-
-
 def replaced(old: str, new: str) -> str:
     text = project()
     assert text.count(old) >= 1, old
@@ -225,34 +220,29 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
         assert part in told
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("terrestrial: 1", "terrestrial: 2", "survey.yaml:1:25: photostrip_terrestrial: this version of photostrip does not read schema 2; expected photostrip_terrestrial: 1"),
-        ("camera: long", "camera: lnog", "survey.yaml:8:18: stations.left.camera: there is no camera `lnog`; expected one of long, wide; did you mean `long`?"),
-        ("preset: UMK 10/1318", "preset: UMK 10", "survey.yaml:5:18: cameras.wide.preset: there is no preset `UMK 10`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `UMK 10/1318`?"),
-        ("{preset: UMK 10/1318}", "{principal_point: [0, 0]}", "survey.yaml:5:9: cameras.wide: nothing says what the camera is; expected `preset`, or `principal_distance` in mm"),
-        ("axes: [east, north, up]\n", "", "survey.yaml:1:1: nothing says which coordinate of a station is east; expected axes: [east, north, up], or [north, east, up] where x points north"),
-        ("[east, north, up]", "[x, y, z]", "survey.yaml:6:7: axes: the axes of the stations are not on the ground; expected a permutation of [east, north, up]"),
-        ("[east, north, up]", "[east, up, up]", "survey.yaml:6:7: axes: [east, up, up] does not say which column is which"),
-        ("axes: [east, north, up]", "axes: [east, north, up]\nbase: 40", "survey.yaml:7:7: base: the base follows from the positions of the stations; remove it"),
-        ("position: [1000.0, 2000.0, 150.0], ", "", "survey.yaml:8:9: stations.left: `alpha` is given and `position` is not; expected both, or neither in the normal case"),
-        ("150.0]", "150.0m]", "survey.yaml:8:51: stations.left.position[2]: `150.0m` has a unit in it; expected a number; write the number alone: 150.0"),
-        ("time: 1}", "time: 3}", "survey.yaml:10:78: epochs[2].time: the time 2 is not later than that of the epoch before, 3; expected ascending times"),
-        ("{id: epoch 1, time: 1}", "epoch 1", "survey.yaml:10:34: epochs[1]: the epoch has no time, others have; give all epochs a time, or none"),
-        ("id: epoch 1,", "id: epoch 3,", "survey.yaml:10:34: epochs[1]: coordinates.csv has no measurement of epoch epoch 3; did you mean `epoch 1`?"),
-        ("id: epoch 1,", "id: epoch 0,", "survey.yaml:10:9: epochs: epoch epoch 0 is named 2 times; remove one"),
-        ("P5]", "P55]", "survey.yaml:12:30: stable[5]: coordinates.csv has no point P55; did you mean `P5`?"),
-        (", sigma: 0.005", "", "coordinates.csv:2: sx: 72 rows have no standard deviation (sx, sz), and none is given for all; set `measurements.sigma` in the project, or fill the column sx, sz"),
-        ("sigma: 0.005", "sigma: 0.005, sigma_d: 1", "survey.yaml:11:79: measurements.sigma_d: coordinates have no pseudo-parallaxes that could have a standard deviation; remove it; use `sigma`"),
-        ("coordinates: coordinates.csv, ", "", "survey.yaml:11:15: measurements: no table is named; expected either `coordinates` or `pseudo_parallaxes`"),
-        ("coordinates: c", "pseudo_parallaxes: p.csv, coordinates: c", "survey.yaml:11:15: measurements: two tables are named; expected either `coordinates` or `pseudo_parallaxes`"),
-        ("coordinates.csv", "coordinate.csv", "survey.yaml:11:29: measurements.coordinates: coordinate.csv does not exist; did you mean `coordinates.csv`?"),
-        ("name: quarry", "presets: mine.yaml", "survey.yaml:2:10: presets: mine.yaml does not exist"),
-    ],
-)  # fmt: skip
-def test_every_wrong_value_is_told_with_its_place(tmp_path: Path, old: str, new: str, expected: str) -> None:
-    tells(write(tmp_path, replaced(old, new)), expected)
+VALUES = [
+    ("terrestrial: 1", "terrestrial: 2", "survey.yaml:1:25: photostrip_terrestrial: this version of photostrip does not read schema 2; expected photostrip_terrestrial: 1"),
+    ("camera: long", "camera: lnog", "survey.yaml:8:18: stations.left.camera: there is no camera `lnog`; expected one of long, wide; did you mean `long`?"),
+    ("preset: UMK 10/1318", "preset: UMK 10", "survey.yaml:5:18: cameras.wide.preset: there is no preset `UMK 10`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `UMK 10/1318`?"),
+    ("{preset: UMK 10/1318}", "{principal_point: [0, 0]}", "survey.yaml:5:9: cameras.wide: nothing says what the camera is; expected `preset`, or `principal_distance` in mm"),
+    ("axes: [east, north, up]\n", "", "survey.yaml:1:1: nothing says which coordinate of a station is east; expected axes: [east, north, up], or [north, east, up] where x points north"),
+    ("[east, north, up]", "[x, y, z]", "survey.yaml:6:7: axes: the axes of the stations are not on the ground; expected a permutation of [east, north, up]"),
+    ("[east, north, up]", "[east, up, up]", "survey.yaml:6:7: axes: [east, up, up] does not say which column is which"),
+    ("axes: [east, north, up]", "axes: [east, north, up]\nbase: 40", "survey.yaml:7:7: base: the base follows from the positions of the stations; remove it"),
+    ("position: [1000.0, 2000.0, 150.0], ", "", "survey.yaml:8:9: stations.left: `alpha` is given and `position` is not; expected both, or neither in the normal case"),
+    ("150.0]", "150.0m]", "survey.yaml:8:51: stations.left.position[2]: `150.0m` has a unit in it; expected a number; write the number alone: 150.0"),
+    ("time: 1}", "time: 3}", "survey.yaml:10:78: epochs[2].time: the time 2 is not later than that of the epoch before, 3; expected ascending times"),
+    ("{id: epoch 1, time: 1}", "epoch 1", "survey.yaml:10:34: epochs[1]: the epoch has no time, others have; give all epochs a time, or none"),
+    ("id: epoch 1,", "id: epoch 3,", "survey.yaml:10:34: epochs[1]: coordinates.csv has no measurement of epoch epoch 3; did you mean `epoch 1`?"),
+    ("id: epoch 1,", "id: epoch 0,", "survey.yaml:10:9: epochs: epoch epoch 0 is named 2 times; remove one"),
+    ("P5]", "P55]", "survey.yaml:12:30: stable[5]: coordinates.csv has no point P55; did you mean `P5`?"),
+    (", sigma: 0.005", "", "coordinates.csv:2: sx: 72 rows have no standard deviation (sx, sz), and none is given for all; set `measurements.sigma` in the project, or fill the column sx, sz"),
+    ("sigma: 0.005", "sigma: 0.005, sigma_d: 1", "survey.yaml:11:79: measurements.sigma_d: coordinates have no pseudo-parallaxes that could have a standard deviation; remove it; use `sigma`"),
+    ("coordinates: coordinates.csv, ", "", "survey.yaml:11:15: measurements: no table is named; expected either `coordinates` or `pseudo_parallaxes`"),
+    ("coordinates: c", "pseudo_parallaxes: p.csv, coordinates: c", "survey.yaml:11:15: measurements: two tables are named; expected either `coordinates` or `pseudo_parallaxes`"),
+    ("coordinates.csv", "coordinate.csv", "survey.yaml:11:29: measurements.coordinates: coordinate.csv does not exist; did you mean `coordinates.csv`?"),
+    ("name: quarry", "presets: mine.yaml", "survey.yaml:2:10: presets: mine.yaml does not exist"),
+]  # fmt: skip
 
 
 TABLE = coordinates().splitlines()
@@ -262,40 +252,41 @@ def table(line: int, text: str) -> str:
     return "\n".join([*TABLE[: line - 1], *([text] if text else []), *TABLE[line:]]) + "\n"
 
 
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        (table(1, "epoch,photo,point,x"), "coordinates.csv:1: z: there is no column `z`"),
-        (table(3, "epoch 0,middle,P0,1,2"), "coordinates.csv:3:9: photo: `middle` is not known; expected one of left, right"),
-        (table(3, "epoch 0,left,P0,1,2"), "coordinates.csv:3:14: point: point P0 stands in line 2 already for the same photo and epoch; keep one of the two, or give one another id"),
-        (table(4, "epoch 0,left,P1,1,5;3"), "coordinates.csv:4:19: z: `5;3` is not a number; expected a number"),
-        (table(4, "epoch 0,left,,1,5"), "coordinates.csv:4:14: point: the point has no id; expected an id on one line"),
-        ("\n".join(TABLE[:25]) + "\n", "survey.yaml:10:34: epochs[1]: coordinates.csv has no measurement of epoch epoch 1; its epochs are epoch 0"),
-        ("", "survey.yaml:11:29: measurements.coordinates: coordinates.csv is empty"),
-    ],
-)  # fmt: skip
-def test_every_wrong_row_is_told_with_its_place(tmp_path: Path, content: str, expected: str) -> None:
-    tells(write(tmp_path, table=content), expected)
+ROWS = [
+    (table(1, "epoch,photo,point,x"), "coordinates.csv:1: z: there is no column `z`"),
+    (table(3, "epoch 0,middle,P0,1,2"), "coordinates.csv:3:9: photo: `middle` is not known; expected one of left, right"),
+    (table(3, "epoch 0,left,P0,1,2"), "coordinates.csv:3:14: point: point P0 stands in line 2 already for the same photo and epoch; keep one of the two, or give one another id"),
+    (table(4, "epoch 0,left,P1,1,5;3"), "coordinates.csv:4:19: z: `5;3` is not a number; expected a number"),
+    (table(4, "epoch 0,left,,1,5"), "coordinates.csv:4:14: point: the point has no id; expected an id on one line"),
+    ("\n".join(TABLE[:25]) + "\n", "survey.yaml:10:34: epochs[1]: coordinates.csv has no measurement of epoch epoch 1; its epochs are epoch 0"),
+    ("", "survey.yaml:11:29: measurements.coordinates: coordinates.csv is empty"),
+]  # fmt: skip
+OF_NORMAL_CASE = [
+    (NORMAL, "point,x,z,p,dx,dz\n1,1,1,1,1,1\n", "pseudo.csv:1: dx_right: there is no column `dx_right`"),
+    (NORMAL, "point,x,z,p,dx,dz,dx_right\n1,1,,5,1,1,1\n", "pseudo.csv:2:5: z: z of point 1 stands in no row; expected a number"),
+    (NORMAL, "point,x,z,p,dx,dz,dx_right\n1,1,1,5,1,1,1\n1,1,1,5,1,1,1\n", "pseudo.csv:3:1: point: point 1 stands in line 2 already; keep one of the two, or give one another id"),
+    (NORMAL, "point,epoch,x,z,p,dx,dz,dx_right\n1,b,1,1,5,1,1,1\n1,c,2,,,1,1,1\n", "pseudo.csv:3:5: x: x of point 1 is 1 in line 2, here 2; write the coordinates of the reference epoch once, or alike"),
+    (NORMAL + "epochs: [a, b]\n", "point,epoch,x,z,p,dx,dz,dx_right\n1,a,1,1,5,1,1,1\n", "pseudo.csv:2:3: epoch: epoch a is the reference, against which pseudo-parallaxes are measured"),
+    (NORMAL + "epochs: [a]\n", PSEUDO, "survey.yaml:6:9: epochs: the list has only one epoch, a; expected two or more"),
+    (NORMAL.replace(", sigma: 0.005", ""), PSEUDO, "pseudo.csv:2: sigma: 1 row has no standard deviation (sigma), and none is given for all"),
+    (NORMAL.replace("base: 50\n", ""), PSEUDO, "survey.yaml:1:1: nothing says how far apart the stations are; expected `base` for the normal case, or position and alpha of both stations"),
+    (NORMAL.replace("base: 50", "base: 50\naxes: [east, north, up]"), PSEUDO, "survey.yaml:5:7: axes: the normal case has axes of its own: right, ahead, up; remove it"),
+    (NORMAL.replace("left: {camera: A}", "left: {camera: A, omega: 3}"), PSEUDO, "survey.yaml:3:18: stations.left: angles are given without a position; expected position and alpha too"),
+    (NORMAL.replace("left: {camera: A}", "left: {camera: A, position: [1, 2, 3], alpha: 3}"), PSEUDO, "survey.yaml:3:11: stations: the right station has no position; expected both or none"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("text", "content", "expected"),
+    ("files", "expected"),
     [
-        (NORMAL, "point,x,z,p,dx,dz\n1,1,1,1,1,1\n", "pseudo.csv:1: dx_right: there is no column `dx_right`"),
-        (NORMAL, "point,x,z,p,dx,dz,dx_right\n1,1,,5,1,1,1\n", "pseudo.csv:2:5: z: z of point 1 stands in no row; expected a number"),
-        (NORMAL, "point,x,z,p,dx,dz,dx_right\n1,1,1,5,1,1,1\n1,1,1,5,1,1,1\n", "pseudo.csv:3:1: point: point 1 stands in line 2 already; keep one of the two, or give one another id"),
-        (NORMAL, "point,epoch,x,z,p,dx,dz,dx_right\n1,b,1,1,5,1,1,1\n1,c,2,,,1,1,1\n", "pseudo.csv:3:5: x: x of point 1 is 1 in line 2, here 2; write the coordinates of the reference epoch once, or alike"),
-        (NORMAL + "epochs: [a, b]\n", "point,epoch,x,z,p,dx,dz,dx_right\n1,a,1,1,5,1,1,1\n", "pseudo.csv:2:3: epoch: epoch a is the reference, against which pseudo-parallaxes are measured"),
-        (NORMAL + "epochs: [a]\n", PSEUDO, "survey.yaml:6:9: epochs: the list has only one epoch, a; expected two or more"),
-        (NORMAL.replace(", sigma: 0.005", ""), PSEUDO, "pseudo.csv:2: sigma: 1 row has no standard deviation (sigma), and none is given for all"),
-        (NORMAL.replace("base: 50\n", ""), PSEUDO, "survey.yaml:1:1: nothing says how far apart the stations are; expected `base` for the normal case, or position and alpha of both stations"),
-        (NORMAL.replace("base: 50", "base: 50\naxes: [east, north, up]"), PSEUDO, "survey.yaml:5:7: axes: the normal case has axes of its own: right, ahead, up; remove it"),
-        (NORMAL.replace("left: {camera: A}", "left: {camera: A, omega: 3}"), PSEUDO, "survey.yaml:3:18: stations.left: angles are given without a position; expected position and alpha too"),
-        (NORMAL.replace("left: {camera: A}", "left: {camera: A, position: [1, 2, 3], alpha: 3}"), PSEUDO, "survey.yaml:3:11: stations: the right station has no position; expected both or none"),
+        *(((replaced(old, new),), expected) for old, new, expected in VALUES),
+        *(((project(), content), expected) for content, expected in ROWS),
+        *(((text, content, "pseudo.csv"), expected) for text, content, expected in OF_NORMAL_CASE),
     ],
-)  # fmt: skip
-def test_every_fault_of_the_normal_case_is_told(tmp_path: Path, text: str, content: str, expected: str) -> None:
-    tells(write(tmp_path, text, content, "pseudo.csv"), expected)
+)
+def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, files: tuple[str, ...], expected: str) -> None:
+    told = faults(write(tmp_path, *files))
+    assert any(each.startswith(expected) for each in told), told
 
 
 def test_faults_of_the_project_and_of_its_table_are_told_together(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ import yaml
 from photostrip.formats.faults import Findings
 from photostrip.project import reading
 from photostrip.project.reading import Node, Place, fault_at, key_path, parse
+from tests.project.samples import Sample
+from tests.project.test_faults import YAML_MANNERS, YAML_SYNTAX
 
 LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(reading.LOADER, id="c")]
 TEXT = """\
@@ -21,7 +23,7 @@ after: {x: 🛩️, y: yes}
 """
 
 
-@pytest.fixture(params=LOADERS)
+@pytest.fixture(autouse=True, params=LOADERS)
 def _loader(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "LOADER", request.param)
 
@@ -31,12 +33,15 @@ def read(text: str) -> tuple[Node | None, Findings]:
     return parse(text, "f.yaml", findings), findings
 
 
-@pytest.mark.usefixtures("_loader")
-def test_every_scalar_stays_text() -> None:
-    root, findings = read(TEXT)
+def tree(text: str = TEXT) -> Node:
+    root, findings = read(text)
     assert root is not None
     assert findings.faults == ()
-    assert root.plain == {
+    return root
+
+
+def test_every_scalar_stays_text() -> None:
+    assert tree().plain == {
         "ключ": "Значение",
         "list": ["a", {"b c": "1:20", "second": ["0123", "NO", "~", "1e3", ""]}],
         "empty": "",
@@ -45,7 +50,6 @@ def test_every_scalar_stays_text() -> None:
     }
 
 
-@pytest.mark.usefixtures("_loader")
 @pytest.mark.parametrize(
     ("path", "line", "column"),
     [
@@ -61,12 +65,9 @@ def test_every_scalar_stays_text() -> None:
     ],
 )
 def test_values_know_their_place(path: tuple[str | int, ...], line: int, column: int) -> None:
-    root, _ = read(TEXT)
-    assert root is not None
-    assert root.place_of(path) == Place("f.yaml", line, column)
+    assert tree().place_of(path) == Place("f.yaml", line, column)
 
 
-@pytest.mark.usefixtures("_loader")
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
@@ -92,14 +93,17 @@ def test_what_is_refused_is_told_with_its_line(text: str, line: int, words: str)
     assert [(fault.file, fault.line) for fault in told] == [("f.yaml", line)]
 
 
-@pytest.mark.usefixtures("_loader")
+@pytest.mark.parametrize("case", [case for case in (*YAML_SYNTAX, *YAML_MANNERS) if "backslash" not in case])
+def test_what_is_wrong_with_a_project_is_explained(project: Sample, case: tuple[str, ...]) -> None:
+    project.refuses(*case)
+
+
 @pytest.mark.parametrize("text", ["", "# nothing\n", "---\n", "%YAML 1.2\n---\n"])
 def test_nothing_is_an_empty_text(text: str) -> None:
-    root, findings = read(text)
-    assert root is not None
-    assert (root.plain, findings.faults) == ("", ())
+    assert tree(text).plain == ""
 
 
+@pytest.mark.parametrize("_loader", LOADERS[1:], indirect=True)
 def test_escapes_that_make_no_character_are_refused() -> None:
     root, findings = read('a: "\\ud800"')
     assert root is None
@@ -121,16 +125,12 @@ def test_paths_are_written_as_they_are_read(path: tuple[str | int, ...], expecte
 
 
 def test_a_fault_below_what_exists_stands_at_what_exists() -> None:
-    root, _ = read(TEXT)
-    assert root is not None
-    fault = fault_at(root, ("list", 1, "second", 9), "no such photo", "code", expected="ten", fix="add it")
+    fault = fault_at(tree(), ("list", 1, "second", 9), "no such photo", "code", expected="ten", fix="add it")
     assert str(fault) == "f.yaml:6:13: list[1].second[9]: no such photo; expected ten; add it"
 
 
 def test_an_alias_is_what_its_anchor_names() -> None:
-    root, findings = read("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos}")
-    assert not findings.faults
-    assert root is not None
+    root = tree("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos}")
     shared = ["x", {"k": "v"}]
     assert root.plain == {"a": shared, "b": shared, "c": {"d": shared}}
     assert root.place_of(("b",)).line == 1  # where it would be put right

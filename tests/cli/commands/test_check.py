@@ -73,15 +73,11 @@ def test_pairs_joints_and_control_are_counted(tmp_path: Path) -> None:
     together = {fault.code for fault in check_project(project).faults}
     assert together == {"too-few-common-points"}  # strips of a block may hang on others
     faults = check_project(project, ["processing.adjustment=polynomial"]).faults
+    pairs, control = "too-few-common-points", "too-little-control"
     told = {(fault.code, fault.line): str(fault) for fault in faults}
-    assert set(told) == {
-        ("too-few-common-points", 12),
-        ("too-few-common-points", 15),
-        ("too-little-control", 10),
-        ("too-little-control", 13),
-    }
-    assert "photos 1001 and 1002 have 2 points in common; expected at least 5" in told["too-few-common-points", 12]
-    assert "strip B has 1 control point in plan and 1 in height" in told["too-little-control", 13]
+    assert set(told) == {(pairs, 12), (pairs, 15), (control, 10), (control, 13)}
+    assert "photos 1001 and 1002 have 2 points in common; expected at least 5" in told[pairs, 12]
+    assert "strip B has 1 control point in plan and 1 in height" in told[control, 13]
 
 
 def test_three_photos_without_a_common_point(project: Path, tmp_path: Path) -> None:
@@ -141,12 +137,9 @@ def test_every_control_coordinate_says_its_sigma_and_where_it_stands(tmp_path: P
     made.write("control.csv", table)
     first, second = check_project(tmp_path / "project.yaml").document["control"]
     assert first["sigma"] == [0.01, 0.06, 0.08]
-    assert [each["source"] for each in first["sigma_from"]] == ["row", "default", "default"]
-    assert [(each["file"].rpartition("/")[2], each["line"]) for each in first["sigma_from"]] == [
-        ("control.csv", 2),
-        ("project.yaml", 26),
-        ("project.yaml", 26),
-    ]
+    default = ("default", "project.yaml", 26)
+    places = [(each["source"], each["file"].rpartition("/")[2], each["line"]) for each in first["sigma_from"]]
+    assert places == [("row", "control.csv", 2), default, default]
     assert second["sigma"] == [0.05, 0.06, None]
     assert second["sigma_from"][2] is None
     found = check_project(tmp_path / "project.yaml", ["control[0].sigma=[1, 2, 3]"]).document["control"][1]
@@ -203,12 +196,8 @@ def test_every_row_is_accounted_for(tmp_path: Path) -> None:
     made.write("fiducials.csv", MARKED_FILES["fiducials.csv"] + "9999,F1,1,2\n")
     made.change("control.csv", "P2,", "N1,1,2,3,off,control\nN2,1,2,3,,check\nP2,")
     checked = check_project(tmp_path / "project.yaml", ["processing.adjustment=polynomial"])
-    rows = {each["file"].rpartition("/")[2]: each for each in checked.document["rows"]}
-    assert {name: (each["rows"], each["used"]) for name, each in rows.items()} == {
-        "observations.csv": (12, 8),
-        "fiducials.csv": (9, 8),
-        "control.csv": (4, 2),
-    }
+    rows = {each["file"].rpartition("/")[2]: (each["rows"], each["used"]) for each in checked.document["rows"]}
+    assert rows == {"observations.csv": (12, 8), "fiducials.csv": (9, 8), "control.csv": (4, 2)}
     told = {note.code: note.message for note in checked.notes if note.code != "unused-camera"}
     for code, words in [
         ("photo-in-no-strip", "9999"),

@@ -11,6 +11,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.comparison import Tolerances, baseline_of
+from photostrip.comparison.comparison import SETS, UNITS
 from photostrip.errors import InputError
 from photostrip.formats.result_json import line_finder, to_json
 from photostrip.project.tolerances import load_tolerances
@@ -22,7 +23,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tests.calls import Call
+    from tests.calls import Answer, Call
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
@@ -272,3 +273,11 @@ def test_a_faulty_profile_is_told_by_line(tmp_path: Path) -> None:
         (5, "scale.relative", "number"),
     ]
     assert "did you mean `absolute`?" in str(refused.value)
+
+
+def test_the_schema_of_profiles_has_their_defaults(answer: Answer) -> None:
+    schema = json.loads(answer("schema", "--tolerances"))
+    for name in (*UNITS, *SETS):
+        default = schema["properties"][name]["default"]
+        assert {key: getattr(getattr(Tolerances(), name), key) for key in default} == default
+    assert (schema["additionalProperties"], schema["required"]) == (False, ["photostrip_tolerances"])
