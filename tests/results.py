@@ -156,6 +156,20 @@ def in_tables(value: Any, block: Block | None = None) -> Any:  # noqa: ANN401
     return in_frame(with_derived(found)) if block is None and "frame" in found else found
 
 
+PLACE: Document = {"file": "", "line": 0, "column": 0, "key": "", "photos": [], "points": []}
+
+
+def a_note(code: str, message: str, **more: object) -> Document:
+    """Give a warning as it stands in a result, or a note."""
+    return {**PLACE, "code": code, "severity": "warning", "message": message, "strip": "", **more}
+
+
+def a_finding(code: str, message: str, **more: object) -> Document:
+    """Give a finding that nobody has accepted."""
+    said = {"code": code, "title": "t", "severity": "warning", "message": message, "fix": "look"}
+    return {**PLACE, **said, "strips": [], "evidence": {}, "accepted": False, **more}
+
+
 def columns_of(rows: list[Document]) -> dict[str, list[Any]]:
     """Give rows as JSON has their table."""
     return {key: [row[key] for row in rows] for key in rows[0]}

@@ -21,7 +21,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import by_rows, case, in_tables, solved, spec
+from tests.results import a_finding, a_note, by_rows, case, in_tables, solved, spec
 from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
@@ -164,12 +164,7 @@ def test_ids_cannot_become_elements() -> None:
 def test_findings_lead_to_rows_and_pictures_and_back() -> None:
     document = by_rows(saved())
     point, pair = document["control"][0]["id"], document["models"][0]
-    blank = {"code": "X", "title": "t", "severity": "warning", "accepted": False, "message": "m", "fix": "f"}
-    where = {"evidence": {}, "strips": [], "file": "", "line": 0, "column": 0, "key": ""}
-    document["findings"] = [
-        blank | where | {"points": [point], "photos": []},
-        blank | where | {"points": [], "photos": [pair["left"]]},
-    ]
+    document["findings"] = [a_finding("X", "m", points=[point]), a_finding("X", "m", photos=[pair["left"]])]
     text = to_html(in_tables(document))
     for number, start in ((1, point), (2, f"{pair['left']} – ")):
         finding = re.search(rf'<li id="finding-{number}">(.*?)</li>', text, re.DOTALL)
@@ -188,9 +183,7 @@ def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
     document = by_rows(saved())
     noted, odd = (row["id"] for row in document["control"][:2])
     document["control"][1]["stands_out"] = ["plan"]
-    where = {"strip": "", "photos": [], "file": "", "line": 0, "column": 0, "key": ""}
-    note = where | {"code": "control-doubtful", "severity": "warning", "points": [noted]}
-    document["notes"].append(note | {"message": f"control point {noted} is wrong"})
+    document["notes"].append(a_note("control-doubtful", f"control point {noted} is wrong", points=[noted]))
     look = [f"control point {noted} is wrong", f"control point {odd} (9 m in plan) stands out", "something else"]
     document["verdict"]["look_at"] = look
     text = to_html(in_tables(document))

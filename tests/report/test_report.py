@@ -19,7 +19,7 @@ from photostrip.report.sections.accuracy_report import chosen_sections, sections
 from photostrip.result.table import Table as ResultTable
 from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
-from tests.results import case, in_tables
+from tests.results import a_note, case, in_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -146,8 +146,6 @@ def screened(**settings: object) -> Document:
     return document
 
 
-WARNING = {"code": "c", "severity": "warning", "message": "mind this", "strip": "", "photos": [], "points": []}
-WARNING |= {"file": "", "line": 0, "column": 0, "key": ""}
 LACKING = [*({"id": f"P{n}", "reason": "measured on one photo"} for n in range(15)), {"id": "Q", "reason": "rejected"}]
 
 
@@ -169,7 +167,7 @@ LACKING = [*({"id": f"P{n}", "reason": "measured on one photo"} for n in range(1
             changed(not_determined=LACKING),
             ["15 points (measured on one photo): P0, P1", "P13, P14", "1 point (rejected): Q"],
         ),
-        ("Notes", changed(notes=[WARNING]), ["warning: mind this"]),
+        ("Notes", changed(notes=[a_note("c", "mind this")]), ["warning: mind this"]),
         ("Scale transfer and junctions", changed(junctions=[]), ["One model: no scale was transferred."]),
         (
             "Project",

@@ -130,3 +130,10 @@ def test_redundancy_numbers_of_control_and_positions_sum_up_to_those_of_their_gr
     assert np.nansum(columns) == pytest.approx(groups["control"], abs=0.02)
     positions = [document["bundle"]["positions"][f"redundancy_{axis}"] for axis in ("east", "north", "up")]
     assert np.sum(positions) == pytest.approx(groups["position"], abs=0.02)
+    # the error that is just found: noncentrality sigma / sqrt(r) (Baarda)
+    rays, reliability = document["residuals"], document["bundle"]["reliability"]
+    share, size = (rays[key].astype(float) for key in ("redundancy_x", "detectable_x_um"))
+    known = share > 0.1
+    expected = reliability["noncentrality"] * reliability["image_sigma_um"] / np.sqrt(share[known])
+    assert size[known] == pytest.approx(expected, rel=1e-3)
+    assert known.sum() > 50

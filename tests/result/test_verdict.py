@@ -18,7 +18,7 @@ from photostrip.result.given import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec
-from tests.results import Document, case, in_tables, solved, spec
+from tests.results import Document, a_finding, a_note, case, in_tables, solved, spec
 from tests.simulated import inputs_of, settings_of
 
 
@@ -83,7 +83,8 @@ def test_check_points_beyond_their_standard_deviations_are_not_good(adjustment: 
     assert text.endswith("; probability below 0.1 % by chance")
     assert document["status"] == LOOK
     # what follows from data that contradict themselves is not said
-    assert verdict_of({**document, "findings": [a_finding("error", [])]})["look_at"] == ["P406 off by a digit"]
+    error = a_finding("P406", "off by a digit", severity="error")
+    assert verdict_of({**document, "findings": [error]})["look_at"] == ["P406 off by a digit"]
 
 
 @pytest.mark.parametrize(
@@ -114,7 +115,7 @@ def test_a_cause_that_is_known_needs_less_evidence() -> None:
     changed = {**check, "height": low, "tests": [{**check["tests"][0], "p": 0.042}]}
     contradicted = {**document, "precision": {**document["precision"], "check": changed}}
     assert verdict_of(contradicted)["status"] == GOOD
-    note = {"code": "curvature-left-out", "severity": "note", "message": "", "points": [], "strip": ""}
+    note = a_note("curvature-left-out", "", severity="note")
     found = verdict_of({**contradicted, "notes": [*document["notes"], note]})
     assert found["status"] == LOOK
     assert "in height 2.2 times, 5 of 10 inside the 95 % interval" in found["look_at"][0]
@@ -151,27 +152,16 @@ def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     assert both["accuracy"].endswith("m in plan with K01, K02")
 
 
-PLACE: Document = {"file": "", "line": 0, "column": 0, "key": "", "photos": []}
-
-
-def a_finding(severity: str, points: list[str]) -> Document:
-    said = {"code": "P406", "title": "t", "severity": severity, "message": "off by a digit", "fix": "look"}
-    return {**PLACE, **said, "points": points, "strips": [], "evidence": {}, "accepted": False}
-
-
-def a_warning(code: str, points: list[str]) -> Document:
-    said = {"code": code, "severity": "warning", "message": f"{code} of {points[0]}"}
-    return {**PLACE, **said, "points": points, "strip": "A"}
-
-
 def test_a_wrong_point_is_told_once_with_what_became_of_it() -> None:
     document = case("projected", 2).document
     control = [row | {"rejected": "z"} if row["id"] == "G02" else row for row in document["control"]]
-    notes = [a_warning("control-rejected", ["G02"]), a_warning("control-rejected", ["G03"]), a_warning("weak", ["G02"])]
-    changed = {**document, "control": control, "notes": notes, "findings": [a_finding("warning", ["G02"])]}
+    warned = (("control-rejected", "G02"), ("control-rejected", "G03"), ("weak", "G02"))
+    notes = [a_note(code, f"{code} of {point}", points=[point], strip="A") for code, point in warned]
+    finding = a_finding("P406", "off by a digit", points=["G02"])
+    changed = {**document, "control": control, "notes": notes, "findings": [finding]}
     expected = ["P406 off by a digit; not used", "control-rejected of G03", "weak of G02"]
     assert verdict_of(in_tables(changed))["look_at"] == expected
-    changed["findings"] = [a_finding("warning", ["G02"]) | {"accepted": True}]
+    changed["findings"] = [finding | {"accepted": True}]
     expected = ["control-rejected of G02", "control-rejected of G03", "weak of G02"]
     assert verdict_of(in_tables(changed))["look_at"] == expected
 

@@ -21,7 +21,7 @@ from photostrip.report.sections.verdict import cures, findings, verdict
 from photostrip.result.verdict import POOR_CONTROL, _control
 from tests.loops import nonempty
 from tests.reports import saved
-from tests.results import Document, by_rows, case, in_tables
+from tests.results import Document, a_finding, a_note, by_rows, case, in_tables
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -125,18 +125,12 @@ def lines(document: Document, width: int = 100) -> list[str]:
     return to_text(title_of(document), chosen_sections(document, width=width), width).splitlines()
 
 
-PLACE = {"file": "", "line": 0, "column": 0, "key": ""}
-
-
 def crowded() -> Document:
     """Give a result in which there is too much of everything: a block of 60 strips with 1000 pairs."""
     document = by_rows(saved())
     control, check = (next(row for row in document["control"] if row["role"] == role) for role in ("control", "check"))
     strip, pair, polynomial = document["strips"][0], document["models"][0], document["polynomials"][0]
     text = "a sentence of some length that says with ids, numbers and units what is wrong with this one and why " * 3
-    note = {"severity": "note", "message": text, "strip": "", "photos": [], "points": []} | PLACE
-    finding = {"title": "a mistake", "severity": "error", "accepted": False, "message": text, "fix": text}
-    finding |= {"evidence": {"size_m": 1.0}, "points": [], "photos": [], "strips": []} | PLACE
     document |= {
         "status": "failed",
         "control": [{**row, "id": f"{n}"} for n in range(300) for row in (control, check)],
@@ -147,8 +141,8 @@ def crowded() -> Document:
         "cameras": [{**document["cameras"][0], "id": f"C{n}"} for n in range(60)],
         "rejected": [{**document["rejected"][0], "point": f"R{n}"} for n in range(500)],
         "not_determined": [{"id": f"U{n}", "reason": f"reason {n % 20}"} for n in range(500)],
-        "notes": [{**note, "code": f"kind {n % 40}"} for n in range(400)],
-        "findings": [{**finding, "code": f"P{100 + n}"} for n in range(50)],
+        "notes": [a_note(f"kind {n % 40}", text, severity="note") for n in range(400)],
+        "findings": [a_finding(f"P{100 + n}", text, severity="error", fix=text) for n in range(50)],
         "tolerances": [{"name": f"t{n}", "value": 1.0, "limit": 0.5, "unit": "m", "passed": False} for n in range(11)],
         "verdict": {**document["verdict"], "look_at": [f"{n} {text}" for n in range(50)]},
     }
@@ -199,13 +193,8 @@ def test_the_worst_check_points_are_shown_and_the_others_counted() -> None:
 def test_nothing_is_said_twice() -> None:
     """What a warning or a finding says stands in the verdict alone; the plausibility has its cure."""
     document = by_rows(saved())
-    warning = {"code": "c", "severity": "warning", "message": "mind this", "strip": "", "photos": [], "points": []}
-    warning |= PLACE
-    finding = {
-        "code": "P101", "title": "units", "severity": "warning", "accepted": False, "message": "too large by 1000",
-        "fix": "write `um`", "evidence": {}, "points": [], "file": "", "line": 0, "column": 0,
-    }  # fmt: skip
-    document |= {"notes": [warning], "findings": [finding]}
+    finding = a_finding("P101", "too large by 1000", title="units", fix="write `um`")
+    document |= {"notes": [a_note("c", "mind this")], "findings": [finding]}
     document["verdict"] = {**document["verdict"], "look_at": ["P101 too large by 1000", "mind this"]}
     printed = "\n".join(lines(in_tables(document)))
     assert printed.count("mind this") == 1
@@ -214,11 +203,7 @@ def test_nothing_is_said_twice() -> None:
 
 
 def test_notes_of_a_kind_are_said_once() -> None:
-    notes = [
-        {"code": "c", "severity": "note", "message": f"strip {name}: so", "strip": name, "photos": [], "points": []}
-        | PLACE
-        for name in "ABC"
-    ]
+    notes = [a_note("c", f"strip {name}: so", severity="note", strip=name) for name in "ABC"]
     assert "- strip A: so (and the same for strips B, C)" in lines({**saved(), "notes": notes})
 
 
