@@ -23,7 +23,7 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
-from tests.fuzzing import blocks, damaged, emptied, projects, tried
+from tests.fuzzing import blocks, damaged, projects, tried
 
 CASES, SEED = 10_000, 1
 MEMORY_MB = 600  # of the process, with all cases one after the other
@@ -41,7 +41,8 @@ def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
         for each in range(number):
             random = Random(f"{seed} {each}")  # noqa: S311 (the same cases every time)
             case, command = damaged(right, random), random.choice(["run", "check"])
-            outcome = tried(case, emptied(Path(place) / "case"), command)
+            with tempfile.TemporaryDirectory(dir=place) as folder:
+                outcome = tried(case, Path(folder), command)
             codes[command, outcome.code] += 1
             seconds.append(outcome.seconds)
             wrong += [f"case {each} ({', '.join(case.done)}; {command}): {fault}" for fault in outcome.faults]

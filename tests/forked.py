@@ -39,17 +39,10 @@ if TYPE_CHECKING:
 
 # What commands import when they need it, beside the modules of the program.
 LIBRARIES = (
-    "jinja2",
-    "pyproj.network",
-    "pyproj.transformer",
-    "rich.live",
-    "rich.table",
-    "scipy.interpolate",
-    "scipy.sparse.csgraph",
-    "scipy.sparse.linalg",
-)
+    "jinja2", "pyproj.network", "pyproj.transformer", "rich.live", "rich.table", "scipy.interpolate",
+    "scipy.sparse.csgraph", "scipy.sparse.linalg",
+)  # fmt: skip
 FLAGS = {"-E", "-I", "-S", "-B", "-u"}  # of the interpreter: too late for a copy, and none needs them
-LEFT_OUT = ("photostrip.__main__",)
 LENGTH = struct.Struct("<q")
 STATUS = struct.Struct("<i")
 MOST_FILES = 100  # that one process hands to another
@@ -124,9 +117,6 @@ class Forks:
         self._folder.cleanup()
 
 
-# ------------------------------------------------------------------------------------------------------ the server
-
-
 def load(libraries: Sequence[str]) -> None:
     """Import all that a command may import, except what only batches on many machines need, and use it."""
     import gc
@@ -136,25 +126,19 @@ def load(libraries: Sequence[str]) -> None:
     from photostrip.threads import limit_threads
 
     limit_threads()
-    for found in walk_packages(photostrip.__path__, "photostrip."):
-        if found.name not in LEFT_OUT:
-            import_module(found.name)
-    for name in libraries:
-        import_module(name)
-    warm_up()
-    gc.collect()
-    gc.freeze()  # no copy looks through what it has from here
-
-
-def warm_up() -> None:
-    """Adjust a small project: what the libraries do at the first one takes as long as the project."""
     from photostrip.cli.main import main
     from tests.results import spec, write_project
 
+    for found in walk_packages(photostrip.__path__, "photostrip."):
+        if found.name != "photostrip.__main__":
+            import_module(found.name)
+    for name in libraries:
+        import_module(name)
     with tempfile.TemporaryDirectory() as folder, redirect_stdout(StringIO()):
-        project = write_project(Path(folder), spec())
-        code = main(["run", str(project), "-o", str(project.parent / "out"), "--html", "--quiet"])
-    assert code == 0
+        project = write_project(Path(folder), spec())  # what the libraries do at the first one takes as long as itself
+        assert main(["run", str(project), "-o", str(project.parent / "out"), "--html", "--quiet"]) == 0
+    gc.collect()
+    gc.freeze()  # no copy looks through what it has from here
 
 
 def serve(address: str) -> None:

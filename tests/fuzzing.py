@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import re
-import shutil
 import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -33,32 +32,12 @@ WORDS = """, ; : # ' " [ ] { } *a \\ | > % @ ? [[[[ - ~ . ../ /dev/null /dev/zer
 nan inf 1e999 -1e308 1e-320 0 -0 0.0 2 180 90 1e3 1e9 null NO true none auto off xy z check px um up down
 local geocentric EPSG:4326 EPSG:99999 model orthometric similarity tau"""
 TEXTS = ["", "A" * 300, "[north, east, up]", *SIGNS, *WORDS.split()]
-OVERRIDES = [
-    "observations.unit=px",
-    "observations.sigma=1e-9",
-    "observations.sigma=1e9",
-    "control[0].sigma=[1e-9,1,1e9]",
-    "control[0].axes=[up,north,east]",
-    "control[0].crs=EPSG:4326",
-    "control[0].crs=geocentric",
-    "output.crs=EPSG:3857",
-    "processing.adjustment=similarity",
-    "processing.polynomial.degree=3",
-    "processing.earth_curvature=model",
-    "processing.refraction=true",
-    "processing.relative.screening=tau",
-    "processing.relative.grubbs_alpha=0.999999",
-    "processing.scale_transfer=distances",
-    "tolerances.check_rms_xy=1e-9",
-    "strips=[]",
-    "cameras={}",
-    "=",
-    "a.b.c=1",
-    "processing.interior.transform=projective",
-    "output.angles.unit=rad",
-    "extends=project.yaml",
-    "[0]=1",
-]
+OVERRIDES = """observations.unit=px observations.sigma=1e-9 observations.sigma=1e9 control[0].sigma=[1e-9,1,1e9]
+control[0].axes=[up,north,east] control[0].crs=EPSG:4326 control[0].crs=geocentric output.crs=EPSG:3857
+processing.adjustment=similarity processing.polynomial.degree=3 processing.earth_curvature=model
+processing.refraction=true processing.relative.screening=tau processing.relative.grubbs_alpha=0.999999
+processing.scale_transfer=distances tolerances.check_rms_xy=1e-9 strips=[] cameras={} = a.b.c=1
+processing.interior.transform=projective output.angles.unit=rad extends=project.yaml [0]=1"""
 
 
 @dataclass
@@ -112,12 +91,8 @@ def blocks(folder: Path) -> list[dict[str, bytes]]:
         for number, photo in enumerate(listed[2].split(", "))
     )
     alone = project.replace(listed[0], single) + f"orientations:\n{table}  role: approximate\n"
-    return [
-        strips,
-        positions,
-        {**files, **given, "project.yaml": (project + observed).encode()},
-        {**files, **given, "project.yaml": alone.encode()},
-    ]
+    texts = (project + observed, alone)
+    return [strips, positions, *({**files, **given, "project.yaml": text.encode()} for text in texts)]
 
 
 def _files_of(path: Path) -> dict[str, bytes]:
@@ -133,11 +108,8 @@ def damaged(projects: list[dict[str, bytes]], random: Random) -> Case:
         case.files[name] = harm(case.files[name], random)
         case.done.append(f"{harm.__name__} {name}")
     if random.random() < 0.2:
-        case.options += ["--set", random.choice(OVERRIDES)]
+        case.options += ["--set", random.choice(OVERRIDES.split())]
     return case
-
-
-# -------------------------------------------------------------------------------------------------- what is done
 
 
 def text_put_in(data: bytes, random: Random) -> bytes:
@@ -263,9 +235,6 @@ HARMS = [
 ]  # fmt: skip
 
 
-# ---------------------------------------------------------------------------------------------- what must hold
-
-
 def tried(case: Case, folder: Path, command: str) -> Outcome:
     """Run a command on a case in an empty folder and find what must not be.
 
@@ -316,10 +285,3 @@ def _files(case: Case, folder: Path, result: Path, code: int) -> list[str]:
     if written:
         json.loads((result / "result.json").read_text(encoding="utf-8"))
     return found
-
-
-def emptied(folder: Path) -> Path:
-    """Give the folder without anything in it."""
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    return folder

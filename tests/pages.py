@@ -21,8 +21,8 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from photostrip.errors import InputError
 from tests.source_tree import ROOT
@@ -32,8 +32,7 @@ FRESH_CLONE = re.compile(r"(^|[|;&]\s*)(make|pip|git|python\S* -m (pip|venv))\b"
 COPIED = ("sample_data", "configs")
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(NamedTuple):
     """One fenced block: its page, the line of its first content line, the words behind the fence, its lines."""
 
     page: Path
@@ -51,10 +50,6 @@ class Block:
         return self.kind == "console" and "no-run" not in self.words
 
     @property
-    def exit_code(self) -> int:
-        return int(self.option("exit") or 0)
-
-    @property
     def place(self) -> str:
         return f"{self.page.name}:{self.line}"
 
@@ -63,8 +58,7 @@ class Block:
         return next((word.partition("=")[2] for word in self.words if word.startswith(f"{name}=")), "")
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):
     """One command of a console block and the lines that it should print."""
 
     command: str
@@ -72,8 +66,7 @@ class Step:
     expected: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What a command did."""
 
     code: int
@@ -90,15 +83,12 @@ def blocks(page: Path) -> list[Block]:
     """Give the fenced blocks of a page in order."""
     found = []
     lines = page.read_text(encoding="utf-8").splitlines()
-    number = 0
-    while number < len(lines):
-        if lines[number].startswith(FENCE):
-            start = number + 1
-            number = next(i for i in range(start, len(lines)) if lines[i] == FENCE)
-            above = next((line for line in reversed(lines[: start - 1]) if line.strip()), "")
-            words = tuple(lines[start - 1].removeprefix(FENCE).split())
-            found.append(Block(page, start + 1, words, tuple(lines[start:number]), above))
-        number += 1
+    fences = iter(number for number, line in enumerate(lines) if line.startswith(FENCE))
+    for begin in fences:
+        end = next(number for number in fences if lines[number] == FENCE)
+        above = next((line for line in reversed(lines[:begin]) if line.strip()), "")
+        words = tuple(lines[begin].removeprefix(FENCE).split())
+        found.append(Block(page, begin + 2, words, tuple(lines[begin + 1 : end]), above))
     return found
 
 
@@ -143,19 +133,7 @@ class Scratch:
         path = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
         if command is not None:
             path[:0] = [str(command.parent), str(command.parent.parent)]  # and the ``python`` beside it
-        elif not (Path(sys.executable).parent / "photostrip").exists():
-            self.environment["PYTHONPATH"] = str(ROOT)
-            path.insert(0, str(self._stand_in(folder / "bin")))
         self.environment["PATH"] = os.pathsep.join(path)
-
-    @staticmethod
-    def _stand_in(folder: Path) -> Path:
-        """Put a ``photostrip`` command into `folder`, for an environment where the package is not installed."""
-        folder.mkdir()
-        script = folder / "photostrip"
-        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m photostrip "$@"\n', encoding="utf-8")
-        script.chmod(0o755)
-        return folder
 
     def write(self, name: str, lines: tuple[str, ...]) -> Path:
         path = self.folder / name
@@ -163,14 +141,12 @@ class Scratch:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
 
-    def run(self, command: list[str]) -> Outcome:
-        done = subprocess.run(
-            command, cwd=self.folder, env=self.environment, capture_output=True, encoding="utf-8", check=False
-        )
-        return Outcome(done.returncode, tuple(line.rstrip() for line in done.stdout.splitlines()), done.stderr)
-
     def shell(self, command: str) -> Outcome:
-        return self.run(["bash", "-c", command])
+        done = subprocess.run(
+            ["bash", "-c", command], cwd=self.folder, env=self.environment, capture_output=True, encoding="utf-8",
+            check=False,
+        )  # fmt: skip
+        return Outcome(done.returncode, tuple(line.rstrip() for line in done.stdout.splitlines()), done.stderr)
 
 
 def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> list[str]:
@@ -183,7 +159,8 @@ def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> lis
         if block.runs:
             found += [fault for step in steps(block) for fault in _faults_of_step(block, step, scratch)]
         elif block.kind == "python" and not block.option("file"):
-            outcome = scratch.run(["python", str(scratch.write("block.py", block.lines))])
+            scratch.write("block.py", block.lines)
+            outcome = scratch.shell("python block.py")
             if outcome.code:
                 found.append(f"{block.place}: {outcome.err}")
         elif block.words[:2] == ("yaml", "project"):
@@ -204,9 +181,9 @@ def _faults_of_project(block: Block, scratch: Scratch) -> list[str]:
 
 def _faults_of_step(block: Block, step: Step, scratch: Scratch) -> list[str]:
     outcome = scratch.shell(step.command)
-    found = []
-    if outcome.code != block.exit_code:
-        found.append(f"{block.place}: $ {step.command}: exit code {outcome.code}, not {block.exit_code}\n{outcome.err}")
+    found, code = [], int(block.option("exit") or 0)
+    if outcome.code != code:
+        found.append(f"{block.place}: $ {step.command}: exit code {outcome.code}, not {code}\n{outcome.err}")
     if not matches(step.expected, outcome.out):
         diff = "\n".join(difflib.unified_diff(step.expected, outcome.out, "the page", "the command", lineterm=""))
         found.append(f"{block.place}: $ {step.command}: prints something else (renew with `make docs`)\n{diff}")

@@ -30,22 +30,21 @@ class Vector:
 
 
 @cache
-def _sections() -> dict[str, list[dict[str, Any]]]:
+def _sections() -> dict[str, list[Vector]]:
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     text = (DATA / "test_vectors.yaml").read_text(encoding="utf-8")
-    document: dict[str, Any] = yaml.load(text, Loader=loader)  # noqa: S506 (both loaders are the safe one)
-    sections: dict[str, list[dict[str, Any]]] = document["sections"]
-    return sections
+    sections = yaml.load(text, Loader=loader)["sections"]  # noqa: S506 (both loaders are the safe one)
+    return {name: [Vector(**entry) for entry in entries] for name, entries in sections.items()}
 
 
 def section(name: str) -> list[Vector]:
     """Give every example of one section, in order."""
-    return [Vector(**entry) for entry in _sections()[name]]
+    return _sections()[name]
 
 
 def vector(id_: str) -> Vector:
     """Give the one example with this id, whatever its section."""
-    return next(Vector(**entry) for entries in _sections().values() for entry in entries if entry["id"] == id_)
+    return next(each for entries in _sections().values() for each in entries if each.id == id_)
 
 
 def cases(name: str, prefix: str = "") -> list[Any]:

@@ -10,21 +10,7 @@ import pytest
 
 from photostrip.network import hypotheses
 from photostrip.network.adjustment import solve
-from photostrip.network.hypotheses import (
-    DECENTRED,
-    DISTANCE,
-    DRIFT,
-    EDGE,
-    FILM,
-    LENS,
-    LIST,
-    OFFSET,
-    POINT,
-    SCALE,
-    SHIFT,
-    Likely,
-    most_likely,
-)
+from photostrip.network.hypotheses import DISTANCE, DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET, Likely, most_likely
 from photostrip.network.problem import PositionObservations
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.loops import nonempty
@@ -38,13 +24,8 @@ if TYPE_CHECKING:
 
 def with_positions_and_lists() -> BundleProblem:
     """Two strips with positions of their own groups, every other control point in a second list."""
-    simulation = simulate(
-        Spec(
-            flight=Flight(photos=6, strips=2),
-            points=Points(rows=3, extra_per_model=2),
-            control=Control(bands=3),
-        )
-    )
+    flight, points = Flight(photos=6, strips=2), Points(rows=3, extra_per_model=2)
+    simulation = simulate(Spec(flight=flight, points=points, control=Control(bands=3)))
     problem, truth = problem_of(simulation), truth_of(simulation)
     random, m = np.random.default_rng(3), problem.photos
     positions = PositionObservations(
@@ -70,19 +51,8 @@ def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
     problem = with_positions_and_lists()
     solution = solve(problem)
     every = asked(solution)
-    assert {each.kind for each in every} == {
-        OFFSET,
-        DRIFT,
-        LIST,
-        LENS,
-        EDGE,
-        DECENTRED,
-        FILM,
-        POINT,
-        DISTANCE,
-        SHIFT,
-        SCALE,
-    }
+    assert {each.kind for each in every} == {OFFSET, DRIFT, LIST, *OF_CAMERAS, *OF_PHOTOS}
+    assert (len(OF_CAMERAS), len(OF_PHOTOS)) == (6, 2)
     for each in nonempty(every):
         (found,) = hypotheses.likeliest(
             solution, 1.0, 1e-9, cameras=True, refused=[other for other in every if other is not each]
@@ -109,11 +79,7 @@ def moved(problem: BundleProblem, number: int) -> float:
     shift = np.zeros(3)
     own = (control.frame == number)[:, None]
     for _ in range(4):
-        steps = []
-        for axis in range(3):
-            step = np.zeros(3)
-            step[axis] = 0.02
-            steps.append([fitted(problem, own, shift + sign * step) for sign in (-1.0, 1.0)])
+        steps = [[fitted(problem, own, shift + step) for step in (-each, each)] for each in 0.02 * np.eye(3)]
         here = fitted(problem, own, shift)
         for axis, (low, high) in enumerate(steps):
             shift[axis] -= 0.02 * (high - low) / (2.0 * (high + low - 2.0 * here))
@@ -127,11 +93,7 @@ def fitted(problem: BundleProblem, own: np.ndarray, shift: np.ndarray) -> float:
 
 
 def test_of_hypotheses_that_explain_alike_the_first_is_taken_and_the_others_are_its_rivals() -> None:
-    first, second, third = (
-        hypotheses.Hypothesis(OFFSET),
-        hypotheses.Hypothesis(DISTANCE, 0),
-        hypotheses.Hypothesis(LENS, 0),
-    )
+    first, second, third = (hypotheses.Hypothesis(kind) for kind in (OFFSET, DISTANCE, hypotheses.LENS))
     found = [Likely.of(first, 500.0, 3, 3), Likely.of(second, 503.0, 1, 3), Likely.of(third, 100.0, 1, 3)]
     likely = most_likely(found, 0.01)
     assert (likely.hypothesis.kind, likely.hypothesis.rivals) == (OFFSET, (DISTANCE,))

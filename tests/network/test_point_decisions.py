@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,22 +11,13 @@ import pytest
 from photostrip.geometry.rotation import from_vector
 from photostrip.network import testing
 from photostrip.network.reliability import Limit
-from photostrip.network.testing import CAUSES, Decisions, PointRays
+from photostrip.network.testing import PointRays
 from photostrip.statistics import normal_quantile
 from photostrip.strip.resection import KnownPhotos, derivatives
 from tests.loops import nonempty
 
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-
-
 SIGMA = 0.005  # mm
 ALPHA = 0.01
-
-
-def limit(alpha: float = ALPHA) -> Limit:
-    value, both = (normal_quantile(1 - level / 2) for level in (alpha, alpha / 2))
-    return Limit(value=value, both=both, given=value, alpha=alpha, alpha_of_given=alpha, unit=1.0)
 
 
 def a_point(seed: int, rays: int = 3) -> PointRays:
@@ -46,44 +36,6 @@ def a_point(seed: int, rays: int = 3) -> PointRays:
         of_photos=np.zeros((2 * rays, 2 * rays)),
         inside=np.zeros(2 * rays, bool),
     )
-
-
-class Decision(NamedTuple):
-    """What is decided about one point."""
-
-    out: Flags
-    cause: str
-    value: float
-    size: Floats
-
-
-def each_of(decided: Decisions) -> list[Decision]:
-    columns = (decided.out, [CAUSES[cause] for cause in decided.cause], decided.value, decided.size)
-    return list(map(Decision, *columns))
-
-
-def decide(point: PointRays, limit: Limit) -> Decision:
-    """Decide on one point."""
-    (found,) = each_of(testing.decide(together(point), limit))
-    return found
-
-
-def together(*points: PointRays) -> PointRays:
-    return PointRays(
-        rays=points[0].rays,
-        coordinates=2,
-        misfit=np.array([each.misfit for each in points]),
-        by_point=np.array([each.by_point for each in points]),
-        of_photos=np.array([each.of_photos for each in points]),
-        inside=np.array([each.inside for each in points]),
-    )
-
-
-def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[Floats, Floats]:
-    """Take sets of rays of one point out: sums of squares (s,) and errors (s, k, 2)."""
-    normal = basis @ weight @ basis.T
-    found = testing._without(np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2)
-    return found.left[0], found.errors[0]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -131,9 +83,10 @@ def test_a_point_that_took_part_is_predicted_as_if_it_had_not(rays: int, gone: t
 def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() -> None:
     point = a_point(3, 5)
     gap, weight, basis = testing._misclosures(point)
-    sets = [(0,), (3,), (4,)]
-    left, errors = without(gap, weight, basis, np.array(sets))
-    for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
+    total, pulled, normal = gap @ weight @ gap, basis @ weight @ gap, basis @ weight @ basis.T
+    rays = [0, 3, 4]
+    found = testing._without(np.array([total]), pulled[None], normal[None], np.array(rays)[:, None], 2)
+    for value, ray, (error,) in nonempty(zip(found.left[0], rays, found.errors[0], strict=True)):
         rows = np.arange(10) // 2 != ray
         design, misfit = point.by_point[rows], point.misfit[rows]
         xyz = np.linalg.lstsq(design, misfit, rcond=None)[0]
@@ -149,5 +102,12 @@ def test_good_points_are_called_wrong_as_often_as_the_level_says(
     rays: int, points: int, fewest: float, most: float
 ) -> None:
     """One test for each coordinate: together at most the level times their number; two rays have half of one test."""
-    alarms = [decide(a_point(seed, rays), limit()).out.any() for seed in range(points)]
+    value, both = (normal_quantile(1 - level / 2) for level in (ALPHA, ALPHA / 2))
+    limit = Limit(value=value, both=both, given=value, alpha=ALPHA, alpha_of_given=ALPHA, unit=1.0)
+    every = [a_point(seed, rays) for seed in range(points)]
+    columns = {
+        name: np.array([getattr(each, name) for each in every])
+        for name in ("misfit", "by_point", "of_photos", "inside")
+    }
+    alarms = testing.decide(replace(every[0], **columns), limit).out.any(axis=1)
     assert fewest * ALPHA < np.mean(alarms) < most * ALPHA
