@@ -13,8 +13,8 @@ from photostrip.network.adjustment import Selection
 from photostrip.network.problem import BundleSettings
 from photostrip.network.reliability import groups_of
 from photostrip.rejection import UNCONTROLLED
-from photostrip.simulation import Flight, Points, Spec
-from tests.pipeline.blocks import adjusted, simulate
+from photostrip.simulation import Flight, Points, Spec, simulate
+from tests.pipeline.blocks import adjusted
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers

@@ -25,6 +25,7 @@ from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Points, Spec, simulate
 from photostrip.strip.relative_orientation import RelativeSettings as Relative
 from tests.loops import nonempty
+from tests.pipeline.blocks import measured, note
 from tests.simulated import inputs_of, settings_of
 from tests.strips import Flown, control_points, fly, project
 
@@ -42,15 +43,9 @@ STAGES = {"relative", "rays", "control"}
 def flown() -> Simulation:
     """A strip of eight photos with gross errors of all sizes and a wrong control coordinate."""
     errors = [GrossError("image", count=3, size_um=size) for size in (60.0, 500.0, 8000.0)]
-    return simulate(
-        Spec(
-            seed=5,
-            flight=Flight(photos=8),
-            points=Points(extra_per_model=8),
-            control=Control(layout="bands", bands=4, per_band=3),
-            gross_errors=(*errors, GrossError("control", size_m=6.0)),
-        )
-    )
+    points, control = Points(extra_per_model=8), Control(layout="bands", bands=4, per_band=3)
+    wrong = (*errors, GrossError("control", size_m=6.0))
+    return simulate(Spec(seed=5, flight=Flight(photos=8), points=points, control=control, gross_errors=wrong))
 
 
 def rejected(inputs: Inputs, adjustment: str = "auto") -> str:
@@ -65,20 +60,12 @@ def rows(text: str) -> list[dict[str, str]]:
 
 def shuffled(inputs: Inputs, seed: int) -> Inputs:
     """Give the same measurements and control in another order, photos and points numbered anew."""
-    rng = np.random.default_rng(seed)
-    o, control = inputs.observations, inputs.control
-    order = rng.permutation(len(o.point))
+    rng, control = np.random.default_rng(seed), inputs.control
+    o = measured(inputs.observations, rng.permutation(len(inputs.observations)))
     photo, point = rng.permutation(len(o.photo_ids)), rng.permutation(len(o.point_ids))
-    moved = replace(
-        o,
-        photo_ids=tuple(o.photo_ids[number] for number in photo),
-        point_ids=tuple(o.point_ids[number] for number in point),
-        photo=np.argsort(photo)[o.photo[order]],
-        point=np.argsort(point)[o.point[order]],
-        xy=o.xy[order],
-        sigma=o.sigma[order],
-    )
-    return replace(inputs, observations=moved, control=control.take(rng.permutation(len(control))))
+    o = replace(o, photo=np.argsort(photo)[o.photo], photo_ids=tuple(o.photo_ids[row] for row in photo))
+    anew = replace(o, point=np.argsort(point)[o.point], point_ids=tuple(o.point_ids[row] for row in point))
+    return replace(inputs, observations=anew, control=control.take(rng.permutation(len(control))))
 
 
 def renamed(inputs: Inputs) -> tuple[Inputs, dict[str, str]]:
@@ -91,10 +78,10 @@ def renamed(inputs: Inputs) -> tuple[Inputs, dict[str, str]]:
         return tuple(new[name] for name in ids)
 
     strips = tuple(replace(strip, photos=told(strip.photos)) for strip in inputs.strips)
-    observations = replace(o, photo_ids=told(o.photo_ids), point_ids=told(o.point_ids))
-    return replace(inputs, strips=strips, observations=observations, control=replace(control, ids=told(control.ids))), {
-        after: before for before, after in new.items()
-    }
+    table = replace(o, photo_ids=told(o.photo_ids), point_ids=told(o.point_ids))
+    given = replace(control, ids=told(control.ids))
+    old = {after: before for before, after in new.items()}
+    return replace(inputs, strips=strips, observations=table, control=given), old
 
 
 @pytest.mark.slow
@@ -125,14 +112,15 @@ def test_the_order_of_rows_does_not_decide(seed: int, adjustment: str) -> None:
 def test_names_do_not_decide() -> None:
     inputs, old = renamed(inputs_of(flown()))
     columns = ("photo", "other_photo", "point", "blamed")
+
+    def without_reason(inputs: Inputs) -> list[dict[str, str]]:
+        return [{key: value for key, value in row.items() if key != "reason"} for row in rows(rejected(inputs))]
+
     found = [
-        {key: old.get(value, value) if key in columns else value for key, value in row.items() if key != "reason"}
-        for row in rows(rejected(inputs))
+        {key: old.get(value, value) if key in columns else value for key, value in row.items()}
+        for row in without_reason(inputs)
     ]
-    expected = [
-        {key: value for key, value in row.items() if key != "reason"} for row in rows(rejected(inputs_of(flown())))
-    ]
-    assert sorted(found, key=repr) == sorted(expected, key=repr)
+    assert sorted(found, key=repr) == sorted(without_reason(inputs_of(flown())), key=repr)
 
 
 WRONG = ("105", "p4_1")
@@ -149,10 +137,8 @@ def spoiled() -> Flown:
 
 def adjusted(keep: tuple[str, ...] = (), drop: tuple[str, ...] = ()) -> Result:
     strip = spoiled()
-    given = {name: strip.xyz[strip.at[name]] for name in strip.bands(0, 3, 6)}
-    return triangulate(
-        project(strip, control_points(given)), Settings(relative=Relative(keep=list(keep), drop=list(drop)))
-    )
+    control = control_points({name: strip.xyz[strip.at[name]] for name in strip.bands(0, 3, 6)})
+    return triangulate(project(strip, control), Settings(relative=Relative(keep=list(keep), drop=list(drop))))
 
 
 def in_use(result: Result, photo: str, point: str) -> bool:
@@ -165,8 +151,7 @@ def in_use(result: Result, photo: str, point: str) -> bool:
 def test_a_measurement_that_is_kept_stays_in_use_and_is_reported() -> None:
     result = adjusted(keep=("105/p4_1",))
     assert in_use(result, *WRONG)
-    (note,) = (note for note in result.notes if note.code == "user-keep")
-    assert "105/p4_1" in note.message
+    assert "105/p4_1" in note(result, "user-keep").message
     back = [r for r in result.strips[0].of_photos.rejections if r.readmitted]
     assert {int(result.strips[0].of_photos.orientation.point[r.row]) for r in back} == {
         result.refined.observations.point_ids.index("p4_1")
@@ -178,7 +163,7 @@ def test_a_measurement_that_is_dropped_takes_no_part_and_is_reported() -> None:
     assert in_use(adjusted(), "103", "p2_0")
     result = adjusted(drop=("103/p2_0",))
     assert not in_use(result, "103", "p2_0")
-    assert [note.code for note in result.notes if note.code.startswith("user-")] == ["user-drop"]
+    assert [each.code for each in result.notes if each.code.startswith("user-")] == ["user-drop"]
 
 
 @pytest.mark.parametrize(
@@ -197,9 +182,9 @@ def test_entries_that_make_no_sense_are_refused(keep: tuple[str, ...], drop: tup
 def test_beyond_400_photos_a_polynomial_asks_for_the_bundle() -> None:
     spec = Spec(flight=Flight(photos=401), points=Points(extra_per_model=1), control=Control(every=20, check=5))
     result = triangulate(inputs_of(simulate(spec)), Settings(adjustment="polynomial"))
-    (note,) = [each for each in result.notes if each.code == "no-precision"]
-    assert "strip A has 401 photos" in note.message
-    assert "`processing.adjustment: bundle`" in note.message
+    message = note(result, "no-precision").message
+    assert "strip A has 401 photos" in message
+    assert "`processing.adjustment: bundle`" in message
     document = document_of(result)
     assert "precision" not in document
     assert {point["sigma_z"] for point in document["points"]} == {None}

@@ -15,9 +15,10 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.result import pictures_of
 from photostrip.report.pictures.svg import Picture
 from photostrip.result.bundle import bundle_of
+from photostrip.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Points, Spec
 from tests.loops import nonempty
-from tests.pipeline.blocks import adjusted, simulate
+from tests.pipeline.blocks import adjusted
 from tests.results import Case, Document, case, solved, spec
 from tests.simulated import inputs_of
 

@@ -1,4 +1,4 @@
-"""Strips of independent models from their coordinates to the ground: truth, precision, what is refused."""
+"""Independent models from their coordinates to the ground: truth, precision, what is named and what is refused."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.network.problem import BundleSettings
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.run import triangulate
-from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
+from photostrip.result.document import document_of
+from photostrip.simulation import Control, Flight, Ground, Models, Points, Simulation, Spec, simulate
 from photostrip.strip import control_screening
 from photostrip.strip.linked_models import LinkSettings
-from tests.loops import nonempty
 from tests.models import inputs, truth
+from tests.pipeline.blocks import centers, errors, moved, note, used_rows
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -27,19 +27,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+
 EXACT = 1e-6  # m
 FREE = (0.0, 0.0, 0.0)
-PLAIN = Settings(adjustment="similarity")
 
 
 def with_points(given: Inputs, points: ModelPoints) -> Inputs:
     assert given.models is not None
     return replace(given, models=replace(given.models, points=points))
-
-
-def linked(given: Inputs, settings: Settings = PLAIN) -> StripResult:
-    (strip,) = triangulate(given, settings).strips
-    return strip
 
 
 @pytest.mark.parametrize(
@@ -57,11 +52,8 @@ def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str,
     spec = Spec(ground=Ground(crs, axes), flight=Flight(photos=7, strips=2), control=Control(noise=FREE), models=asked)
     simulated = simulate(spec)
     result = triangulate(inputs_of(simulated), Settings(adjustment=adjustment))
-    assert np.abs(result.points.cartesian - simulated.truth.points.xyz[result.points.number]).max() < EXACT
-    place = {photo: row for row, photo in enumerate(simulated.truth.photo_ids)}
-    for strip in nonempty(result.strips):
-        found = strip.intermediate.cartesian_from_intermediate(strip.placed.centers)
-        assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
+    assert np.abs(errors(simulated, result)).max() < EXACT
+    assert np.abs(centers(result) - simulated.truth.centers).max() < EXACT
     assert len(result.ties.number) > 3
     assert np.abs(result.ties.difference).max() < EXACT
 
@@ -73,20 +65,11 @@ def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordin
     given = truth(8, 3, 4)
     noise = np.random.default_rng(1).normal(size=(len(given.model), 3))
     whole = inputs(given, given.measured(noise), bands=5)
-    enu = whole.control.enu.copy()
-    row = int(np.flatnonzero(~whole.control.check)[4])
-    enu[row, 2] += 5.0
-    strip = linked(replace(whole, control=replace(whole.control, enu=enu)))
-    assert [(each.row, each.axes) for each in strip.wrong_control] == [
-        (strip.control.ids.index(whole.control.ids[row]), (2,))
-    ]
-    assert strip.wrong_control[0].size[2] == pytest.approx(5.0, abs=1.0)
-
-
-# ---------------------------------------------------------------------------------------------------- precision
-
-
-SEARCHED_FOR_NOTHING = Settings(links=LinkSettings("none"))
+    row = used_rows(whole)[4:5]
+    (strip,) = triangulate(moved(whole, row, [0.0, 0.0, 5.0]), Settings(adjustment="similarity")).strips
+    (wrong,) = strip.wrong_control
+    assert (strip.control.ids[wrong.row], wrong.axes) == (whole.control.ids[row[0]], (2,))
+    assert wrong.size[2] == pytest.approx(5.0, abs=1.0)
 
 
 @pytest.mark.slow
@@ -95,22 +78,19 @@ def test_standard_deviations_are_those_of_repetitions() -> None:
     """The squares of errors at right angles that have their own size add up to the variance of what is linear."""
     given, rng = truth(3, 3, 1), np.random.default_rng(5)
     first = inputs(given, given.measured(rng.normal(size=(len(given.model), 3))), bands=2)
-    settings = replace(SEARCHED_FOR_NOTHING, bundle=BundleSettings(test="baarda"))
+    settings = Settings(links=LinkSettings("none"), bundle=BundleSettings(test="baarda"))
     whole = triangulate(first, settings)
     assert whole.precision is not None
     assert whole.precision.basis == ("a-priori",)
     points, places = [], []
-    taken = ~first.control.check
-    values = 3 * len(given.model) + 3 * int(taken.sum())
+    taken = used_rows(first)
+    values = 3 * len(given.model) + 3 * len(taken)
     for drawn in np.linalg.qr(rng.normal(size=(values, values)))[0] * np.sqrt(values):
         of_models, of_control = np.split(drawn.reshape(-1, 3), [len(given.model)])
         again = with_points(first, given.measured(of_models))
-        enu = first.control.enu.copy()
-        enu[taken] += 0.02 * of_control
-        found = triangulate(replace(again, control=replace(first.control, enu=enu)), settings)
-        (strip,) = found.strips
+        found = triangulate(moved(again, taken, 0.02 * of_control), settings)
         points.append(found.points.cartesian - given.points[found.points.number])
-        places.append(strip.intermediate.cartesian_from_intermediate(strip.placed.centers) - given.centers)
+        places.append(centers(found) - given.centers)
     for samples, covariances in (
         (np.array(points), whole.precision.points),
         (np.array(places), whole.precision.photos[0][:, :3, :3]),
@@ -118,9 +98,6 @@ def test_standard_deviations_are_those_of_repetitions() -> None:
         ratio = np.sqrt((samples**2).mean(axis=0) / np.diagonal(covariances, axis1=1, axis2=2))
         assert ratio.min() > 0.99
         assert ratio.max() < 1.01
-
-
-# ------------------------------------------------------------------------------------------------- mistakes
 
 
 def mistaken(kind: str) -> Inputs:
@@ -132,11 +109,8 @@ def mistaken(kind: str) -> Inputs:
     points, control = given.models.points, given.control
     xyz, enu, sigma = points.xyz.copy(), control.enu.copy(), points.sigma
     inside = points.node < len(points.point_ids)
-    twice = [k for k in np.flatnonzero((points.model == 3) & inside) if (points.node == points.node[k]).sum() == 2]
     if kind == "a model in metres":
         xyz[points.model == 2] /= 1000
-    elif kind == "one id for two points":
-        xyz[twice[0]] = xyz[twice[-1]] + [3.0, -2.0, 0.1]
     elif kind == "sigma in mm":
         sigma = sigma * 1000
     elif kind == "sigma in m":
@@ -149,7 +123,7 @@ def mistaken(kind: str) -> Inputs:
     elif kind == "control swapped":
         enu = enu[:, [1, 0, 2]]
     elif kind == "a digit":
-        enu[np.flatnonzero(~control.check)[3], 0] += 1000.0
+        enu[used_rows(given)[3], 0] += 1000.0
     elif kind == "heights in feet":
         enu[:, 2] /= 0.3048
     whole = replace(given, control=replace(control, enu=enu))
@@ -173,9 +147,57 @@ def test_mistakes_that_a_result_tells(kind: str, notes: set[str], findings: set[
     assert {finding.code for finding in result.findings} == findings
 
 
-@pytest.mark.parametrize(("kind", "finding"), [("control swapped", "P401"), ("centers below", "P401")])
-def test_mistakes_that_stop_a_run(kind: str, finding: str) -> None:
+@pytest.mark.parametrize("kind", ["control swapped", "centers below"])
+def test_mistakes_that_stop_a_run(kind: str) -> None:
     with pytest.raises(InputError) as told:
         triangulate(mistaken(kind), Settings(precision=False))
     assert [fault.code for fault in told.value.faults] == ["left-handed-models"]
-    assert finding in {each.code for each in told.value.findings}
+    assert "P401" in {each.code for each in told.value.findings}
+
+
+def block(*, noise: bool = False, strips: int = 3) -> Simulation:
+    models = Models(axes="any") if noise else Models(sigma_um=FREE, center_sigma_um=FREE, axes="any")
+    control = Control() if noise else Control(noise=FREE)
+    points = Points(extra_per_model=4)
+    return simulate(Spec(seed=7, flight=Flight(photos=9, strips=strips), points=points, control=control, models=models))
+
+
+def controlled_in(simulated: Simulation, strip: int) -> Inputs:
+    """Leave the control of one strip only; the others become new points."""
+    given = inputs_of(simulated)
+    assert given.models is not None
+    models, points = given.models.strips[strip].models, given.models.points
+    rows = np.isin(points.model, [points.model_ids.index(name) for name in models])
+    names = {points.name(node) for node in points.node[rows].tolist()}
+    alone = np.array([name in names for name in given.control.ids], bool)
+    return replace(given, control=given.control.take(alone | given.control.check))
+
+
+def test_strips_without_control_are_carried_by_the_others() -> None:
+    simulated = block()
+    result = triangulate(controlled_in(simulated, 1), Settings())
+    assert result.bundle is not None
+    assert np.abs(errors(simulated, result)).max() < 10 * EXACT
+    assert np.abs(centers(result) - simulated.truth.centers).max() < 10 * EXACT
+
+
+def test_wrong_rows_and_wrong_control_are_named() -> None:
+    """A row 2 mm off in one of three models and more, and a control point 5 m too high: these, and nothing else."""
+    given = inputs_of(block(noise=True))
+    assert given.models is not None
+    points, rng = given.models.points, np.random.default_rng(3)
+    times = np.bincount(points.node, minlength=len(points.point_ids))[points.node]
+    held = [name in given.control.ids for name in points.point_ids]
+    inside = np.flatnonzero((points.node < len(points.point_ids)) & (times > 2))
+    wrong = rng.choice([row for row in inside if not held[points.node[row]]], 3, replace=False)
+    xyz, high = points.xyz.copy(), used_rows(given)[:1]
+    xyz[wrong] += [2.0, -1.0, 1.0]
+    result = triangulate(moved(with_points(given, replace(points, xyz=xyz)), high, [0.0, 0.0, 5.0]), Settings())
+    assert result.bundle is not None
+    selection, block_rows = result.bundle.screened.selection, result.bundle.block.rows
+    assert sorted(block_rows[~selection.images].tolist()) == sorted(wrong.tolist())
+    assert note(result, "control-rejected").points == (given.control.ids[high[0]],)
+    document = document_of(result)
+    out = [row for row in document["rejected"] if row["stage"] == "bundle" and row.get("models")]
+    names = {(points.model_ids[points.model[row]], points.point_ids[points.node[row]]) for row in wrong.tolist()}
+    assert {(row["models"][0], row["point"]) for row in out if not row["readmitted"]} == names

@@ -16,19 +16,30 @@ from photostrip.comparison import compare_results
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
 from photostrip.pipeline.inputs import Inputs, Strip
-from photostrip.points import PhotoPoints
 from photostrip.report.html import to_html
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.result.verdict import verdict_of
 from photostrip.sheets.trace import trace_sheet
-from photostrip.simulation import Control, Flight, Gnss, Ground, Image, Points, Simulation, Spec, Terrain
-from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
+from photostrip.simulation import Control, Flight, Gnss, Ground, Image, Points, Simulation, Spec, Terrain, simulate
+from tests.pipeline.blocks import (
+    adjusted,
+    corners,
+    errors,
+    exact,
+    measured,
+    note,
+    orientations,
+    positions,
+    rms,
+    with_camera,
+    with_control,
+)
 from tests.results import result_files
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from photostrip.pipeline.inputs import GivenOrientations
     from photostrip.pipeline.results import Result
@@ -37,16 +48,9 @@ if TYPE_CHECKING:
 SAME_MINIMUM = 1e-6  # metres, by which two starts of one adjustment end apart
 SENSOR = Camera("uav", 8.8, format=(13.2, 8.8), pixel_size=0.0024)
 FLOWN = Flight(
-    photos=4,
-    strips=4,
-    alternate=True,
-    end_lap_percent=80,
-    side_lap_percent=60,
-    scale=None,
-    flying_height=100,
-    attitude_sigma_deg=(2, 2, 3),
-    position_sigma=(0.5, 0.5, 0.3),
-)
+    4, 4, alternate=True, end_lap_percent=80, side_lap_percent=60, scale=None, flying_height=100,
+    attitude_sigma_deg=(2, 2, 3), position_sigma=(0.5, 0.5, 0.3),
+)  # fmt: skip
 UAV = Spec(
     camera=SENSOR,
     flight=FLOWN,
@@ -58,24 +62,17 @@ UAV = Spec(
 )
 
 
-def block(**flight: object) -> Simulation:
-    return simulate(replace(UAV, flight=replace(FLOWN, **flight)))  # type: ignore[arg-type]
+def in_no_order(inputs: Inputs) -> Inputs:
+    """Take the photos of all strips out of their order."""
+    singles = [replace(s, id=name, photos=(name,), listed=False) for s in inputs.strips for name in s.photos]
+    return replace(inputs, strips=tuple(singles))
 
 
-def in_no_order(inputs: Inputs, strips: Sequence[str] = ()) -> Inputs:
-    """Take the photos of all strips out of their order, but of some."""
-    kept = [strip for strip in inputs.strips if strip.id in strips]
-    others = [strip for strip in inputs.strips if strip.id not in strips]
-    singles = [replace(s, id=name, photos=(name,), listed=False) for s in others for name in s.photos]
-    return replace(inputs, strips=(*kept, *singles))
-
-
-def three_corners(simulation: Simulation, noise: float = 0.03) -> Inputs:
+def three_corners(simulation: Simulation) -> Inputs:
     """Three control points, and GNSS."""
-    inputs = with_control(simulation, corners(simulation)[:3])
-    rng = np.random.default_rng(4)
-    n = sum(len(strip.photos) for strip in inputs.strips)
-    return replace(inputs, positions=positions(simulation, sigma=noise, noise=rng.normal(0.0, noise, (n, 3))))
+    noise = np.random.default_rng(4).normal(0.0, 0.03, (16, 3))
+    given = positions(simulation, sigma=0.03, noise=noise)
+    return replace(with_control(simulation, corners(simulation)[:3]), positions=given)
 
 
 def five_points(simulation: Simulation) -> Inputs:
@@ -83,35 +80,15 @@ def five_points(simulation: Simulation) -> Inputs:
     return with_control(simulation, [*corners(simulation), names[len(names) // 2]])
 
 
-def turned(inputs: Inputs, degrees: Sequence[float]) -> Inputs:
-    """Photos turned about their axes, as a camera is held in one way or another."""
-    points = inputs.observations
-    angle = np.radians(np.resize(degrees, len(points.photo_ids)))[points.photo]
-    cosine, sine = np.cos(angle), np.sin(angle)
-    x, y = points.xy.T
-    xy = np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
-    square = replace(inputs.strips[0].camera, format=(16.0, 16.0))
-    strips = tuple(replace(strip, camera=square) for strip in inputs.strips)
-    return replace(inputs, strips=strips, observations=replace(points, xy=xy))
-
-
-def rough(simulation: Simulation, degrees: float, metres: float) -> GivenOrientations:
-    """Orientations as a consumer drone has them."""
+def rough(simulation: Simulation) -> GivenOrientations:
+    """Orientations as a consumer drone has them, to a metre and a degree."""
     given, rng = orientations(simulation, observed=False), np.random.default_rng(5)
-    return replace(
-        given,
-        enu=given.enu + rng.normal(0.0, metres, given.enu.shape),
-        angles=given.angles + rng.normal(0.0, np.radians(degrees), given.angles.shape),
-    )
-
-
-def rms(simulation: Simulation, result: Result) -> float:
-    return float(np.sqrt((errors(simulation, result) ** 2).sum(axis=1).mean()))
+    enu = given.enu + rng.normal(0.0, 1.0, given.enu.shape)
+    return replace(given, enu=enu, angles=given.angles + rng.normal(0.0, np.radians(1.0), given.angles.shape))
 
 
 def told(result: Result) -> str:
-    (note,) = [note.message for note in result.notes if note.code == "photos-in-no-order"]
-    return note
+    return note(result, "photos-in-no-order").message
 
 
 def apart(one: Result, other: Result) -> float:
@@ -125,7 +102,7 @@ def apart(one: Result, other: Result) -> float:
 @pytest.mark.parametrize("given", [three_corners, five_points])
 def test_sixteen_photos_come_out_as_their_strips_do(given: Callable[[Simulation], Inputs]) -> None:
     """Four lines flown to and fro; GNSS and three control points, or five control points alone."""
-    simulation = block()
+    simulation = simulate(UAV)
     inputs = given(simulation)
     result = adjusted(simulation, in_no_order(inputs))
     assert told(result) == (
@@ -140,7 +117,7 @@ def test_sixteen_photos_come_out_as_their_strips_do(given: Callable[[Simulation]
 
 def test_oblique_photos_start_from_their_orientations() -> None:
     """Looking aside by 45 degrees, side by side and head to tail."""
-    simulation = block()
+    simulation = simulate(UAV)
     truth = simulation.truth
     lean = np.stack([from_vector([0.0, side * np.pi / 4, 0.0]) for side in np.resize([1, -1], len(truth.rotations))])
     rotations = truth.rotations @ lean
@@ -151,53 +128,43 @@ def test_oblique_photos_start_from_their_orientations() -> None:
     )
     xy = -8.8 * seen[:, :2] / seen[:, 2:]
     kept = np.abs(xy).max(axis=1) < 20.0
-    wide = replace(inputs.strips[0].camera, format=(40.0, 40.0))
-    table = replace(points, photo=points.photo[kept], point=points.point[kept], xy=xy[kept], sigma=points.sigma[kept])
-    strips = tuple(replace(strip, camera=wide) for strip in inputs.strips)
-    inputs = in_no_order(replace(inputs, strips=strips, observations=table))
-    result = adjusted(simulation, replace(inputs, orientations=rough(leaning, 1.0, 1.0)))
+    wide = with_camera(inputs, format=(40.0, 40.0))
+    inputs = in_no_order(replace(wide, observations=measured(replace(points, xy=xy), kept)))
+    result = adjusted(simulation, replace(inputs, orientations=rough(leaning)))
     assert rms(simulation, result) < 0.1
 
 
 def test_a_photo_that_no_strip_takes_is_resected_on_the_points_of_its_neighbours() -> None:
-    simulation = block()
+    simulation = simulate(UAV)
     inputs = five_points(simulation)
     points = inputs.observations
     lost = points.photo_ids.index("2002")
     rows = np.flatnonzero(points.photo == lost)
     gone = rows[np.argsort(np.abs(points.xy[rows, 0] + points.xy[rows, 1]))[:-4]]  # of it four points are left
-    left = np.setdiff1d(np.arange(len(points)), gone)
-    table = replace(
-        points, photo=points.photo[left], point=points.point[left], xy=points.xy[left], sigma=points.sigma[left]
-    )
+    table = measured(points, np.setdiff1d(np.arange(len(points)), gone))
     result = adjusted(simulation, in_no_order(replace(inputs, observations=table)))
     assert told(result).endswith("1 photo is oriented one by one, 2002")
     assert rms(simulation, result) < 0.05
 
 
-def with_points_of_their_own(inputs: Inputs, photos: Sequence[str]) -> Inputs:
-    """Rename the points on some photos, so that these share none with the others."""
-    points = inputs.observations
-    own = np.isin(points.photo, [points.photo_ids.index(name) for name in photos])
-    names = (*points.point_ids, *(f"own {name}" for name in points.point_ids))
-    table = replace(points, point=np.where(own, points.point + len(points.point_ids), points.point), point_ids=names)
-    return replace(inputs, observations=table)
-
-
 def test_a_photo_that_hangs_on_nothing_is_refused_by_name() -> None:
-    simulation = block()
-    inputs = with_points_of_their_own(five_points(simulation), ["3003"])
+    """Its points bear other names than on the other photos."""
+    inputs = five_points(simulate(UAV))
+    points = inputs.observations
+    own = points.photo == points.photo_ids.index("3003")
+    names = (*points.point_ids, *(f"own {name}" for name in points.point_ids))
+    table = replace(points, point=points.point + own * len(points.point_ids), point_ids=names)
     with pytest.raises(GeometryError, match=r"photo 3003, which is in no strip, .*give its orientation roughly"):
-        adjusted(simulation, in_no_order(inputs))
+        adjusted(simulate(UAV), in_no_order(replace(inputs, observations=table)))
 
 
 MICROMETRE = 1e-6  # metres
 MANY = Control(noise=(0.0, 0.0, 0.0), layout="bands", bands=6, per_band=3)
 
 
-def singles(simulation: Simulation, inputs: Inputs | None = None) -> Inputs:
+def singles(simulation: Simulation) -> Inputs:
     """Cut every strip into its photos."""
-    inputs = inputs_of(simulation) if inputs is None else inputs
+    inputs = inputs_of(simulation)
     strips = [Strip(photo, strip.camera, (photo,)) for strip in inputs.strips for photo in strip.photos]
     return replace(inputs, strips=tuple(strips))
 
@@ -254,19 +221,9 @@ def test_a_strip_with_a_pair_that_cannot_be_oriented_starts_from_given_orientati
     used[result.bundle.block.rows[result.bundle.screened.selection.images]] = True
     assert not used[wrong].any()
     assert np.count_nonzero(~used) <= len(wrong) + 3
-    kept = np.ones(len(seen), bool)
-    kept[wrong] = False
-    cut = PhotoPoints(
-        photo_ids=seen.photo_ids,
-        point_ids=seen.point_ids,
-        photo=seen.photo[kept],
-        point=seen.point[kept],
-        xy=seen.xy[kept],
-        sigma=seen.sigma[kept],
-    )
-    without = adjusted(simulation, replace(inputs, observations=cut))
-    error, least = (np.sqrt((errors(simulation, each) ** 2).sum(axis=1).mean()) for each in (result, without))
-    assert error < 1.2 * least
+    right = np.setdiff1d(np.arange(len(seen)), wrong)
+    without = adjusted(simulation, replace(inputs, observations=measured(seen, right)))
+    assert rms(simulation, result) < 1.2 * rms(simulation, without)
     document = document_of(result)
     verdict = verdict_of(document)
     assert verdict["status"] == "look"

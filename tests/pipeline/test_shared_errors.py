@@ -1,9 +1,4 @@
-"""What all camera positions share, or all photos of a camera, is named as such and costs no good observation.
-
-A control list that lies beside the others as a whole is named as such, and none of its points alone.
-
-One id for two points in two strips is named; a wrong image coordinate of a tie is not taken for it.
-"""
+"""What all positions, photos of a camera or points of a list share is named as such and costs no good observation."""
 
 from __future__ import annotations
 
@@ -12,12 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, norm
 
+from photostrip.camera import Camera, Distortion
+from photostrip.network.hypotheses import log_probability, log_probability_of_any
 from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
-from photostrip.simulation import Control, Flight, Gnss, GrossError, Points, Spec, Terrain, simulate
+from photostrip.simulation import FILM, Control, Flight, Gnss, GrossError, Image, Points, Spec, Terrain, simulate
 from tests.loops import nonempty
+from tests.pipeline import blocks
+from tests.pipeline.blocks import calibrating, errors, lost, measured, moved, offset, rms, with_camera
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -32,48 +32,25 @@ def adjusted(
     *,
     strips: int = 2,
     shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-    distance: float = 1.0,
-    seed: int = 7,
-    control: Control | None = None,
-    use: tuple[bool, bool, bool] = (True, True, True),
     rows: slice | np.ndarray = slice(None),
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
     flight = Flight(photos=10, strips=strips)
-    simulation = simulate(Spec(seed=seed, flight=flight, control=control or Control(bands=2), gnss=Gnss()))
+    simulation = simulate(Spec(seed=7, flight=flight, control=Control(bands=2), gnss=Gnss()))
     inputs, photos = inputs_of(simulation), simulation.truth.photo_ids
     assert simulation.gnss is not None
     inputs = replace(
         inputs,
-        strips=tuple(
-            replace(each, camera=replace(each.camera, principal_distance=each.camera.principal_distance * distance))
-            for each in inputs.strips
-        ),
         positions=CameraPositions(
             photos=photos,
             frame=inputs.frames[0],
             enu=simulation.gnss[rows] + np.asarray(shift, float),
-            use=np.tile(use, (len(photos), 1)),
+            use=np.ones((len(photos), 3), bool),
             sigma=np.tile((0.10, 0.10, 0.15), (len(photos), 1)),
             time=np.full(len(photos), np.nan),
         ),
     )
     return simulation, triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
-
-
-def rms(simulation: Simulation, result: Result) -> float:
-    """Root mean square distance of the adjusted points from their true places, metres."""
-    truth = dict(zip(simulation.truth.points.ids, simulation.truth.points.xyz, strict=True))
-    names = result.refined.observations.point_ids
-    rows = [row for row, number in enumerate(result.points.number.tolist()) if names[number] in truth]
-    off = [result.points.cartesian[row] - truth[names[int(result.points.number[row])]] for row in rows]
-    return float(np.sqrt((np.array(off) ** 2).sum(axis=1).mean()))
-
-
-def lost(result: Result) -> list[str]:
-    """Kinds of the given coordinates that were taken out."""
-    assert result.bundle is not None
-    return [each.kind for each in result.bundle.screened.rejections if each.kind != "image" and not each.readmitted]
 
 
 @pytest.mark.slow
@@ -87,8 +64,8 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
     assert finding.code == "P208"
     assert finding.key == "camera_positions.correction"
     assert "`correction: offset`" in finding.message
-    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.6)
-    assert lost(result) == []
+    assert offset(finding) == pytest.approx(shift, abs=0.6)
+    assert lost(result, "control", "position") == []
     assert rms(simulation, result) < 0.4
 
 
@@ -99,25 +76,18 @@ def test_a_drift_of_the_positions_is_named() -> None:
     (finding,) = result.findings
     assert "`correction: drift`" in finding.message
     assert finding.evidence["drift_east_m"] == pytest.approx(4.5, abs=0.3)
-    assert lost(result) == []
+    assert lost(result, "control", "position") == []
 
 
 HILLS = Spec(seed=5, flight=Flight(photos=8), control=Control(bands=4), terrain=Terrain(relief=150.0))
 
 
-def on_hills(share: float, *errors: GrossError) -> Result:
-    """Adjust a strip over hills by the strip method."""
-    simulation = simulate(replace(HILLS, gross_errors=errors))
-    inputs = inputs_of(simulation)
-    (strip,) = inputs.strips
-    camera = replace(strip.camera, principal_distance=strip.camera.principal_distance * (1.0 + share))
-    return triangulate(replace(inputs, strips=(replace(strip, camera=camera),)), settings_of(simulation))
-
-
 @pytest.mark.parametrize("share", [-0.01, 0.02])
 def test_the_strip_method_names_a_principal_distance_off_by_a_percent(share: float) -> None:
     """Control was rejected one by one, or bent the strip, and heights were off by a metre."""
-    result = on_hills(share)
+    simulation = simulate(HILLS)
+    inputs = with_camera(inputs_of(simulation), principal_distance=153.0 * (1.0 + share))
+    result = triangulate(inputs, settings_of(simulation))
     (finding,) = result.findings
     assert finding.code == "P107"
     assert finding.key == "cameras.film.principal_distance"
@@ -143,7 +113,7 @@ def test_positions_of_other_photos_are_named_and_put_right(rows: slice | np.ndar
     assert finding.evidence["order"] == order
     moved = np.flatnonzero(np.arange(10)[rows] != np.arange(10)) if order == "exchanged" else np.arange(10)
     assert finding.photos == tuple(simulation.truth.photo_ids[row] for row in moved)
-    assert [kind for kind in lost(result) if kind == "control"] == []
+    assert lost(result, "control") == []
     assert rms(simulation, result) < 1.2 * rms(*adjusted(strips=1))
 
 
@@ -153,24 +123,23 @@ def test_what_is_given_in_height_only_may_be_of_another_kind(adjustment: str) ->
     made = simulate(Spec(seed=5, flight=Flight(photos=10), control=Control(every=3, use={"xyz": 0.6, "z": 0.4})))
     inputs = inputs_of(made)
     only = inputs.control.use[:, 2] & ~inputs.control.use[:, 0] & ~inputs.control.check
-    enu = inputs.control.enu + np.outer(only, [0.0, 0.0, 31.0])
-    wrong = replace(inputs, control=replace(inputs.control, enu=enu))
-    result = triangulate(wrong, replace(settings_of(made), adjustment=adjustment))
-    (finding,) = [each for each in result.findings if each.code == "P404"]
+    result = triangulate(moved(inputs, only, [0, 0, 31]), replace(settings_of(made), adjustment=adjustment))
+    (finding,) = result.findings
+    assert finding.code == "P404"
     assert "what is given in height only" in finding.message
     assert set(finding.points) <= {inputs.control.ids[row] for row in np.flatnonzero(only)}
     assert finding.evidence["offset_up_m"] == pytest.approx(31.0, abs=0.5)
-    assert {each.code for each in result.findings} == {"P404"}
+
+
+FOUR_BANDS = Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4))
 
 
 def two_lists(shift: Sequence[float]) -> Result:
     """Adjust a strip of which every third control point stands in a second list, shifted as a whole."""
-    spec = Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4))
-    simulation = simulate(spec)
+    simulation = simulate(FOUR_BANDS)
     inputs = inputs_of(simulation)
-    control = inputs.control
-    second = np.arange(len(control)) % 3 == 0
-    control = replace(control, frame=second.astype(np.intp), enu=control.enu + np.outer(second, shift))
+    second = np.arange(len(inputs.control)) % 3 == 0
+    control = replace(moved(inputs, second, shift).control, frame=second.astype(np.intp))
     frames = (inputs.frames[0], replace(inputs.frames[0]))
     return triangulate(replace(inputs, control=control, frames=frames), settings_of(simulation))
 
@@ -182,7 +151,7 @@ def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, floa
     result = two_lists(shift)
     (finding,) = result.findings
     assert (finding.code, finding.key) == (code, "control[1]")
-    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
+    assert offset(finding) == pytest.approx(shift, abs=0.3)
     assert finding.message.endswith("cannot be told")  # of two lists
     assert result.strips[0].wrong_control == ()
     assert result.bundle is not None
@@ -195,12 +164,10 @@ def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, floa
 
 def with_moved_checks(shift: Sequence[float], count: int, adjustment: str) -> Result:
     """Adjust a strip of which so many of ten check points are shifted."""
-    simulation = simulate(Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4)))
+    simulation = simulate(FOUR_BANDS)
     inputs = inputs_of(simulation)
-    enu = inputs.control.enu.copy()
-    enu[np.flatnonzero(inputs.control.check)[:count]] += shift
-    settings = replace(settings_of(simulation), adjustment=adjustment)
-    return triangulate(replace(inputs, control=replace(inputs.control, enu=enu)), settings)
+    rows = np.flatnonzero(inputs.control.check)[:count]
+    return triangulate(moved(inputs, rows, shift), replace(settings_of(simulation), adjustment=adjustment))
 
 
 @pytest.mark.slow
@@ -213,18 +180,15 @@ def test_check_points_that_lie_beside_the_result_are_named_together(
     (finding,) = result.findings
     assert (finding.code, finding.key) == ("P411", "control[0]")
     assert set(finding.points) == {name for name in result.inputs.control.ids if name.startswith("K")}
-    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
+    assert offset(finding) == pytest.approx(shift, abs=0.3)
     (line,) = document_of(result)["verdict"]["look_at"]
     assert line.startswith("P411 the check points of control[0] all lie")
     for count in (1, 2):
         assert "P411" not in {each.code for each in with_moved_checks(shift, count, adjustment).findings}
 
 
-SPEC = Spec(
-    seed=3,
-    flight=Flight(photos=8, strips=2),
-    control=Control(bands=3),
-    points=Points(extra_per_model=20),
+SPEC = replace(
+    FOUR_BANDS, flight=Flight(photos=8, strips=2), control=Control(bands=3), points=Points(extra_per_model=20)
 )
 
 
@@ -233,11 +197,9 @@ def with_shared_ids(simulation: Simulation, inputs: Inputs, count: int, distance
     o = inputs.observations
     truth = dict(zip(simulation.truth.points.ids, simulation.truth.points.xyz, strict=True))
     first = np.isin(o.photo, [o.photo_ids.index(name) for name in inputs.strips[0].photos])
-    in_both = (np.bincount(o.point[first], minlength=len(o.point_ids)) > 1) & (
-        np.bincount(o.point[~first], minlength=len(o.point_ids)) > 1
-    )
+    times = np.array([np.bincount(o.point[rows], minlength=len(o.point_ids)) for rows in (first, ~first)])
     free = np.array([name in truth and name not in inputs.control.ids for name in o.point_ids])
-    ties = np.flatnonzero(in_both & free)
+    ties = np.flatnonzero((times > 1).all(axis=0) & free)
     place = np.array([truth[o.point_ids[each]] for each in ties])
     apart = np.linalg.norm(place[:, None] - place[None], axis=2)
     np.fill_diagonal(apart, np.inf)
@@ -250,8 +212,7 @@ def with_shared_ids(simulation: Simulation, inputs: Inputs, count: int, distance
         keep &= ~((o.point == one) & ~first) & ~((o.point == other) & first)
         point[(o.point == other) & ~first] = one
         names.add(o.point_ids[one])
-    changed = replace(o, photo=o.photo[keep], point=point[keep], xy=o.xy[keep], sigma=o.sigma[keep])
-    return replace(inputs, observations=changed), names
+    return replace(inputs, observations=measured(replace(o, point=point), keep)), names
 
 
 @pytest.mark.slow
@@ -282,3 +243,94 @@ def test_wrong_image_coordinates_are_no_shared_ids(size: float) -> None:
     findings = triangulate(inputs_of(simulation), settings).findings
     assert {each.code for each in findings} == ({"P304"} if size > 200 else set())
     assert {name for each in findings for name in each.points} <= {each.point for each in simulation.truth.errors}
+
+
+K1 = -2e-8  # mm^-2: 20 µm at 100 mm
+LENS = Distortion("brown", "image_to_ideal", k=(K1, 0.0, 0.0))
+
+
+def strip_of(seed: int, photos: int = 30, *wrong: GrossError) -> Spec:
+    points, control = Points(extra_per_model=6), Control(bands=8)
+    return Spec(seed=seed, flight=Flight(photos=photos), points=points, control=control, gross_errors=wrong)
+
+
+def undistorted(simulation: Simulation, **settings: object) -> Result:
+    """Adjust a simulation as if its camera had no distortion."""
+    return blocks.adjusted(simulation, with_camera(inputs_of(simulation), distortion=None), **settings)
+
+
+def taken_up(result: Result) -> list[str]:
+    assert result.bundle is not None
+    return [each.name for each in result.bundle.parameters]
+
+
+def height_rms(simulation: Simulation, result: Result) -> float:
+    """Rms of the errors in height, metres."""
+    return float(np.sqrt((errors(simulation, result)[:, 2] ** 2).mean()))
+
+
+@pytest.mark.slow
+def test_an_unstated_lens_is_named_and_costs_nothing() -> None:
+    spec = strip_of(21)
+    sound, bent = simulate(spec), simulate(replace(spec, camera=replace(FILM, distortion=LENS)))
+    result = undistorted(bent)
+    (finding,) = result.findings
+    assert finding.code == "P110"
+    assert finding.key == "processing.self_calibration"
+    assert "[k1]" in finding.fix
+    assert finding.evidence["k1"] == pytest.approx(K1, abs=4 * float(finding.evidence["k1_standard_deviation"]))
+    assert lost(result, "control") == []
+    assert height_rms(bent, result) < 1.1 * height_rms(sound, undistorted(sound))
+    left = undistorted(bent, search_cameras=False)
+    assert taken_up(left) == []
+    assert height_rms(bent, left) > 1.3 * height_rms(bent, result)
+
+
+@pytest.mark.slow
+def test_film_that_shrank_one_way_is_named_and_no_control_is_doubted() -> None:
+    sound = simulate(strip_of(25, 12))
+    inputs = inputs_of(sound)
+    shrunk = replace(inputs, observations=replace(inputs.observations, xy=inputs.observations.xy * [0.998, 1.0]))
+    result = triangulate(shrunk, settings_of(sound))
+    (finding,) = result.findings
+    assert finding.code == "P112"
+    assert "[affinity, shear]" in finding.fix
+    assert finding.evidence["x_over_y_percent"] == pytest.approx(-0.2, abs=0.01)
+    assert lost(result, "control") == []
+    assert height_rms(sound, result) < 1.1 * height_rms(sound, triangulate(inputs, settings_of(sound)))
+
+
+@pytest.mark.slow
+def test_gross_errors_are_no_error_of_a_camera() -> None:
+    for seed in range(31, 33):
+        wrong = (GrossError("image", count=8, size_um=150.0), GrossError("control", count=2, size_m=3.0))
+        assert taken_up(undistorted(simulate(strip_of(seed, 20, *wrong)))) == []
+
+
+@pytest.mark.slow
+def test_a_lens_that_nobody_calibrated_costs_no_more_than_one_that_is_asked_for() -> None:
+    """Two strips of a drone, turned by ten degrees: f 1 % off, the principal point 0.1 mm, k1 and k2 unstated."""
+    stated = Camera("uav", principal_distance=8.8, format=(13.2, 8.8), pixel_size=0.0024)
+    lens = Distortion("brown", "image_to_ideal", k=(2e-4, -3e-6, 0.0))
+    true = replace(stated, principal_distance=8.888, principal_point=(0.1, -0.07), distortion=lens)
+    flight = Flight(6, 2, end_lap_percent=80, side_lap_percent=70, flying_height=60, attitude_sigma_deg=(10, 10, 5))
+    control = Control(layout="random", count=12, check=10, sigma=(0.01, 0.01, 0.015))
+    points, terrain = Points(rows=5, extra_per_model=15), Terrain(relief=8.0)
+    spec = Spec(camera=true, flight=flight, terrain=terrain, points=points, control=control, image=Image(sigma_um=1.4))
+    simulation = simulate(spec)
+    inputs, settings = inputs_of(simulation), settings_of(simulation)
+    inputs = replace(inputs, strips=tuple(replace(strip, camera=stated) for strip in inputs.strips))
+    found = triangulate(inputs, settings)
+    assert [each.code for each in found.findings] == ["P107", "P110", "P111"]
+    assert "[k1, k2]" in found.findings[1].fix
+    assert lost(found, "control") == []
+    asked = calibrating(inputs, "principal_distance", "principal_point", "k1", "k2")
+    assert errors(simulation, found) == pytest.approx(errors(simulation, triangulate(asked, settings)), abs=1e-6)
+
+
+def test_probabilities_are_those_of_scipy_and_go_on_where_numbers_end() -> None:
+    for squares, freedom in ((3.0, 1), (30.0, 2), (200.0, 12)):
+        assert log_probability(squares, freedom) == pytest.approx(chi2.logsf(squares, freedom), rel=1e-9)
+    assert log_probability(4000.0, 1) == pytest.approx(norm.logsf(4000.0**0.5) + np.log(2.0), rel=1e-5)
+    assert log_probability_of_any(36.0, 1, 100) == pytest.approx(norm.logsf(6.0) + np.log(200.0), rel=1e-9)
+    assert log_probability_of_any(0.0, 1, 100) == 0.0
