@@ -35,7 +35,6 @@ from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import TracebackType
 
 # What commands import when they need it, beside the modules of the program.
 LIBRARIES = (
@@ -107,9 +106,7 @@ class Forks:
         assert self._server.stdout.read(1), "the server did not start"
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for pipe in (self._server.stdin, self._server.stdout):
             assert pipe is not None
             pipe.close()

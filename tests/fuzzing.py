@@ -8,7 +8,7 @@ import json
 import re
 import time
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.cli.main import main
 from photostrip.formats import result_files
@@ -49,8 +49,7 @@ class Case:
     done: list[str] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """How a case ended."""
 
     code: int
@@ -84,13 +83,13 @@ def blocks(folder: Path) -> list[dict[str, bytes]]:
     listed = re.search(r"- id: .*\n  camera: (.*)\n  photos: \[([^]]*)\]\n", project)
     if listed is None:
         raise RuntimeError("the project lists no photos")
-    table = '  file: photos.csv\n  crs: "local"\n  axes: [east, north, up]\n'
-    observed = f"orientations:\n{table}  role: observed\n  sigma: [0.1, 0.1, 0.1]\n  sigma_angles: [0.01, 0.01, 0.01]\n"
+    table = 'orientations:\n  file: photos.csv\n  crs: "local"\n  axes: [east, north, up]\n  role: '
+    observed = f"{table}observed\n  sigma: [0.1, 0.1, 0.1]\n  sigma_angles: [0.01, 0.01, 0.01]\n"
     single = "".join(
         f"- {{id: S{number}, camera: {listed[1]}, photos: [{photo}]}}\n"
         for number, photo in enumerate(listed[2].split(", "))
     )
-    alone = project.replace(listed[0], single) + f"orientations:\n{table}  role: approximate\n"
+    alone = project.replace(listed[0], single) + f"{table}approximate\n"
     texts = (project + observed, alone)
     return [strips, positions, *({**files, **given, "project.yaml": text.encode()} for text in texts)]
 

@@ -45,16 +45,10 @@ class Truth:
     def measured(self, noise: Floats | None = None, sigma: tuple[float, float, float] = SIGMA) -> ModelPoints:
         """Give the models as measured; `noise` in units of the standard deviations, shape (n, 3)."""
         xyz = self.exact if noise is None else self.exact + noise * sigma
-        models, photos = len(self.scale), len(self.centers)
-        return ModelPoints(
-            tuple(f"M{k + 1}" for k in range(models)),
-            tuple(f"P{k:03d}" for k in range(len(self.points))),
-            tuple(str(101 + k) for k in range(photos)),
-            self.model,
-            self.node,
-            xyz,
-            np.tile(sigma, (len(xyz), 1)),
-        )
+        models = tuple(f"M{k + 1}" for k in range(len(self.scale)))
+        points = tuple(f"P{k:03d}" for k in range(len(self.points)))
+        photos = tuple(str(101 + k) for k in range(len(self.centers)))
+        return ModelPoints(models, points, photos, self.model, self.node, xyz, np.tile(sigma, (len(xyz), 1)))
 
 
 def truth(models: int = 6, across: int = 3, seed: int = 1, *, spread: float = 2.0, relief: float = 50.0) -> Truth:

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from photostrip.errors import InputError
+from photostrip.project.loading import load_project
 from tests.source_tree import ROOT
 
 FENCE = "```"
@@ -164,19 +165,11 @@ def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> lis
             if outcome.code:
                 found.append(f"{block.place}: {outcome.err}")
         elif block.words[:2] == ("yaml", "project"):
-            found += _faults_of_project(block, scratch)
+            try:
+                load_project(scratch.write(block.option("file") or "block.yaml", block.lines))
+            except InputError as error:
+                found += [f"{block.place}: {fault}" for fault in error.faults]
     return found
-
-
-def _faults_of_project(block: Block, scratch: Scratch) -> list[str]:
-    from photostrip.project.loading import load_project
-
-    path = scratch.write(block.option("file") or "block.yaml", block.lines)
-    try:
-        load_project(path)
-    except InputError as error:
-        return [f"{block.place}: {fault}" for fault in error.faults]
-    return []
 
 
 def _faults_of_step(block: Block, step: Step, scratch: Scratch) -> list[str]:

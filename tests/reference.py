@@ -48,12 +48,8 @@ def python_page() -> str:
     errors = [each for each in found if inspect.isclass(each) and issubclass(each, Exception)]
     classes = [each for each in found if inspect.isclass(each) and each not in errors]
     steps = [getattr(photostrip.steps, name) for name in STEPS]
-    lines = [
-        "# Reference: Python",
-        "",
-        "What stays from version to version: see [In Python](../library.md#what-stays).",
-        "",
-    ]
+    above = "What stays from version to version: see [In Python](../library.md#what-stays)."
+    lines = ["# Reference: Python", "", above, ""]
     for title, listed in (("Functions", functions), ("Objects", classes), ("Errors", errors)):
         lines += [f"## {title}", ""]
         for each in listed:
@@ -120,11 +116,9 @@ def _attributes(kind: type) -> Iterator[tuple[str, str]]:
 def _below(body: list[ast.stmt], one: ast.stmt) -> str:
     """Return the text that stands below a statement."""
     after = dict(pairwise(body)).get(one)
-    return (
-        " ".join(str(after.value.value).split())
-        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
-        else ""
-    )
+    if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+        return " ".join(str(after.value.value).split())
+    return ""
 
 
 def _signature(function: Callable[..., Any]) -> str:

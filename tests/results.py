@@ -104,11 +104,7 @@ _results: dict[bytes, Result] = {}
 
 
 def known(
-    inputs: Inputs,
-    settings: Settings,
-    *,
-    directory: Path | None = None,
-    tied: TiedFrames | None = None,
+    inputs: Inputs, settings: Settings, *, directory: Path | None = None, tied: TiedFrames | None = None
 ) -> Result:
     """Do as ``triangulate``, or give what the same data with the same settings gave before, far from any grid."""
     if directory is not None and any(path.suffix in GRIDS for path in directory.iterdir()):

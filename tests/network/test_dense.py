@@ -37,7 +37,7 @@ from tests.simulated_bundle import problem_of, truth_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -75,23 +75,13 @@ def misfits(problem: BundleProblem, centers: Floats, rotations: Floats, points: 
         found = -focal[:, None] * ray[:, :2] / ray[:, 2:] - bend
     image = (images.xy - found) / images.sigma
     ground = np.einsum("nij,nj->ni", control.axes, points[control.point] - control.xyz) / control.sigma
-    places = _place_misfits(problem.positions, centers, rotations, common[_calibrated(names) :])
+    drifts = common[sum(name.startswith("camera") for name in names) :]
+    places = _place_misfits(problem.positions, centers, rotations, drifts)
     turn = Rotation.from_matrix(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo]).as_rotvec()
-    return np.concatenate(
-        [image.ravel(), -ground.ravel(), -places.ravel(), -(turn / attitudes.sigma).ravel(), -common / prior(problem)]
-    )
-
-
-def prior(problem: BundleProblem) -> Floats:
-    """A-priori sigmas of the common parameters."""
-    sigma, positions = problem.cameras.sigma, problem.positions
-    own = np.zeros(0) if sigma is None else sigma[sigma > 0.0]
-    drifts = [s[s > 0.0] for s in (positions.offset_sigma, positions.drift_sigma)]
-    return np.concatenate([own, *drifts])
-
-
-def _calibrated(names: Sequence[str]) -> int:
-    return sum(name.startswith("camera") for name in names)
+    sigmas = (problem.cameras.sigma, problem.positions.offset_sigma, problem.positions.drift_sigma)
+    prior = np.concatenate([each[each > 0.0] for each in sigmas if each is not None])
+    parts = (image, -ground, -places, -turn / attitudes.sigma, -common / prior)
+    return np.concatenate([each.ravel() for each in parts])
 
 
 def _bent(problem: BundleProblem, xy: Floats, common: Floats, camera: NDArray[np.intp]) -> tuple[Floats, Floats]:

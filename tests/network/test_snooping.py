@@ -44,10 +44,8 @@ def test_the_level_grows_with_the_errors_that_are_established(problem: BundlePro
     for known, point in ((0, 0), (5, 5)):
         images = problem.images.point >= point  # without the first points
         done = snooping.ScreenedBundle.of(problem, replace(every, images=images), BundleSettings())
-        every_test = [
-            each.redundancy >= UNCONTROLLED for each in groups_of(done.problem, done.solution, done.precision)
-        ]
-        q, i, m = 0.01, known + 1, int(sum(each.sum() for each in every_test)) + known
+        groups = groups_of(done.problem, done.solution, done.precision)
+        q, i, m = 0.01, known + 1, int(sum((each.redundancy >= UNCONTROLLED).sum() for each in groups)) + known
         assert m > 2 * done.solution.redundancy  # there are more tests than conditions
         assert done.limit.alpha == pytest.approx(i * q / (m + 1 - i * (1 - q)))
         assert done.limit.alpha_of_given == pytest.approx(q / (m - known + q))
