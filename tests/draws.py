@@ -15,9 +15,8 @@ if TYPE_CHECKING:
 def orthogonal_normal(rng: np.random.Generator, count: int, values: int) -> Floats:
     """Give standard normal draws in rows, shape (count, values), of which each `values` rows are at right angles.
 
-    A row of independent normal values is a direction, none of which is more likely, and a length; here the directions
-    of a block of rows are those of a random orthogonal matrix, so each row is what it would be alone. The variance of
-    what is linear in the values is known from one block to 2.4 / values of itself, from as many independent rows to
+    Directions of a block are those of a random orthogonal matrix: each row is what it would be alone. The variance of
+    what is linear in the values comes from one block to 2.4 / values of itself, from independent rows to
     sqrt(2 / values).
     """
     directions: list[Floats] = []

@@ -11,14 +11,22 @@ from photostrip.points import PhotoPoints
 from photostrip.strip.corrections import ImageCorrectionSettings
 
 if TYPE_CHECKING:
-    from photostrip.points import ModelPoints
     from photostrip.simulation import Simulation
 
 
 def inputs_of(simulation: Simulation) -> Inputs:
     """Return what a project file and its tables would say of a simulation, without rounding."""
-    if simulation.models is not None:
-        return _inputs_of_models(simulation, simulation.models)
+    if (points := simulation.models) is not None:
+        if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
+            points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))  # turned over, as a project says it
+        return Inputs(
+            name=simulation.spec.name,
+            strips=(),
+            observations=PhotoPoints.naming(points.point_ids),
+            control=simulation.control,
+            frames=simulation.frames,
+            models=MeasuredModels(tuple(model_strips(simulation, points)), points),
+        )
     return Inputs(
         name=simulation.spec.name,
         strips=tuple(Strip(name, simulation.camera, photos) for name, photos in simulation.strips),
@@ -26,20 +34,6 @@ def inputs_of(simulation: Simulation) -> Inputs:
         control=simulation.control,
         frames=simulation.frames,
         fiducials=simulation.fiducials,
-    )
-
-
-def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
-    """Return the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
-    if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
-        points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))
-    return Inputs(
-        name=simulation.spec.name,
-        strips=(),
-        observations=PhotoPoints.naming(points.point_ids),
-        control=simulation.control,
-        frames=simulation.frames,
-        models=MeasuredModels(tuple(model_strips(simulation, points)), points),
     )
 
 

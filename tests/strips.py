@@ -52,17 +52,8 @@ def measured(photos: Mapping[str, Mapping[str, ArrayLike]], sigma: float = STATE
     number = {name: n for n, name in enumerate(points)}
     rows = [(n, number[name], *np.asarray(xy)) for n, image in enumerate(photos.values()) for name, xy in image.items()]
     columns = np.array(rows, float).reshape(-1, 4)
-    return PhotoPoints(
-        tuple(photos),
-        points,
-        columns[:, 0].astype(int),
-        columns[:, 1].astype(int),
-        columns[:, 2:],
-        np.full((len(rows), 2), sigma),
-    )
-
-
-# ----------------------------------------------------------------------------------------------- pairs
+    photo, point = columns[:, :2].T.astype(int)
+    return PhotoPoints(tuple(photos), points, photo, point, columns[:, 2:], np.full((len(rows), 2), sigma))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +101,6 @@ def batch(left: Floats, right: Floats, focal: float) -> Pairs:
     )
 
 
-def gruber(
-    rng: np.random.Generator, pairs: int, *, a: float, b: float, counts: Sequence[int], scatter: float
-) -> Floats:
-    """Left photo coordinates around the six standard points, shape (pairs, n, 2)."""
-    centers = np.array([[0, 0], [b, 0], [0, a], [b, a], [0, -a], [b, -a]], float)
-    return np.repeat(centers, counts, axis=0) + rng.uniform(-scatter, scatter, (pairs, sum(counts), 2))
-
-
 def true_pairs(
     rng: np.random.Generator,
     pairs: int = 1,
@@ -131,7 +114,8 @@ def true_pairs(
 ) -> TruePairs:
     """Random pairs: both photos tilted and turned, ground with relief, standard points scattered by a tenth."""
     a = b = 0.6 * focal
-    nadir = gruber(rng, pairs, a=a, b=b, counts=counts, scatter=0.1 * a)
+    standard = np.array([[0, 0], [b, 0], [0, a], [b, a], [0, -a], [b, -a]], float)
+    nadir = np.repeat(standard, counts, axis=0) + rng.uniform(-0.1 * a, 0.1 * a, (pairs, sum(counts), 2))
     depth = focal * (1 + rng.uniform(-relief, relief, nadir.shape[:2]))
     ground: Floats = np.concatenate([nadir * (depth / focal)[..., None], -depth[..., None]], axis=2)
     angles = rng.uniform(-tilt_deg, tilt_deg, (2, pairs, 3))
@@ -144,9 +128,6 @@ def true_pairs(
     noise = rng.normal(0, sigma, (2, *left.shape)) if sigma else np.zeros((2, *left.shape))
     base = np.einsum("pji,pj->pi", first, bases) / np.linalg.norm(bases, axis=1)[:, None]
     return TruePairs(batch(left + noise[0], right + noise[1], focal), base, first.transpose(0, 2, 1) @ second)
-
-
-# ---------------------------------------------------------------------------------------------- strips
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,9 +195,6 @@ def fly(
     rows = [names.index(name) for name in observations.point_ids]
     at = {name: n for n, name in enumerate(observations.point_ids)}
     return Flown(observations, xyz[rows], centers, rotations, focal, base, height, at)
-
-
-# --------------------------------------------------------------------------------------------- control
 
 
 def control_points(

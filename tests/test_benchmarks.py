@@ -54,9 +54,7 @@ def test_bundle_prints_times_and_ratios() -> None:
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
     assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 3
-    assert re.search(
-        r"^models +\d\.\d{3}/\d\.\d{3} +\d\.\d{3}/\d\.\d{3} +\d+ of \d+ +\d+ of \d+ +0 of 0", out, re.MULTILINE
-    )
+    assert re.search(r"^models(?: +\d\.\d{3}/\d\.\d{3}){2}(?: +\d+ of \d+){2} +0 of 0", out, re.MULTILINE)
 
 
 @pytest.mark.slow
@@ -72,11 +70,7 @@ def test_causes_prints_a_row_for_each_kind_and_layout_beside_the_goals() -> None
     assert re.search(r"^alarms: 0\.00 % of 2 sound projects \(goal: at most 0\.5 %\), 0 refused", out, re.MULTILINE)
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "told"),
-    [(0.001, 0.003, True), (1e-8, 1e-7, False), (3.0, 4.0, True)],
-    ids=["seen", "not", "refused"],
-)
+@pytest.mark.parametrize(("low", "high", "told"), [(0.001, 0.003, True), (1e-8, 1e-7, False), (3.0, 4.0, True)])
 def test_a_planted_mistake_counts_where_the_sum_of_squares_grows(low: float, high: float, told: bool) -> None:
     film = planted.Mistake("film", planted.shrunk(low, high), ("P112",), columns=1)
     wrong = film.plant(film.make(43003))

@@ -75,13 +75,9 @@ def violations(root: Path) -> list[str]:
     found += _circles(sorted(module_edges))
     found += _circles((room(here), room(there)) for here, there in module_edges if room(here) != room(there))
     for depth in (3, 4):  # photostrip.room.folder, photostrip.room.folder.folder: no circle between folders either
-        pairs = ((_cut(here, depth), _cut(there, depth)) for here, there in sorted(module_edges))
+        pairs = ([".".join(each.split(".")[:depth]) for each in edge] for edge in sorted(module_edges))
         found += _circles((here, there) for here, there in pairs if here != there)
     return list(dict.fromkeys(found))
-
-
-def _cut(module: str, depth: int) -> str:
-    return ".".join(module.split(".")[:depth])
 
 
 def _circles(edges: Iterable[tuple[str, str]]) -> list[str]:

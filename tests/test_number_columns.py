@@ -33,9 +33,8 @@ def test_numbers_are_written_as_python_writes_them(numbers: list[float]) -> None
 
 @given(NUMBERS, st.integers(0, 12))
 def test_decimals_are_those_of_a_format(numbers: list[float], decimals: int) -> None:
-    assert written(number_columns.as_fixed(np.array(numbers), decimals, "")) == [
-        f"{each:.{decimals}f}" for each in numbers
-    ]
+    said = written(number_columns.as_fixed(np.array(numbers), decimals, ""))
+    assert said == [f"{each:.{decimals}f}" for each in numbers]
 
 
 def test_middles_between_two_decimals_go_where_their_binary_digits_lie() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import email
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -30,12 +31,8 @@ pytestmark = pytest.mark.slow
 
 def build(kind: str, folder: Path, source: Path = ROOT) -> Path:
     """Build one archive of the project without the network and give its path."""
-    subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)],
-        cwd=source,
-        check=True,
-        capture_output=True,
-    )
+    command = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
+    subprocess.run(command, cwd=source, check=True, capture_output=True)
     (archive,) = folder.iterdir()
     return archive
 
@@ -58,21 +55,6 @@ def test_the_wheel_holds_the_package_and_nothing_else(tmp_path: Path) -> None:
     assert all(">=" in line for line in nonempty(core))
 
 
-@pytest.fixture(scope="module")
-def source_archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build("sdist", tmp_path_factory.mktemp("sdist"))
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory, source_archive: Path) -> Path:
-    """Build the wheel from the source archive, away from the clone."""
-    folder = tmp_path_factory.mktemp("wheel")
-    with tarfile.open(source_archive) as archive:
-        archive.extractall(folder, filter="data")
-    (source,) = folder.glob("photostrip-*")
-    return build("wheel", folder / "built", source)
-
-
 def installed(requirements: Iterable[str], extras: Iterable[str]) -> dict[str, Distribution]:
     """Give what is installed here of all that is required, directly or not: each must be of a version that will do."""
     found: dict[str, Distribution] = {}
@@ -92,9 +74,12 @@ def link(found: Iterable[Distribution], packages: Path) -> None:
                 (packages / top).symlink_to(Path(str(each.locate_file(top))).resolve())
 
 
-def test_the_wheel_runs_in_an_environment_that_has_what_it_asks_for_and_nothing_else(
-    tmp_path: Path, wheel: Path
-) -> None:
+def test_the_wheel_runs_in_an_environment_that_has_what_it_asks_for_and_nothing_else(tmp_path: Path) -> None:
+    """The wheel that is built from the source archive, away from the clone."""
+    with tarfile.open(build("sdist", tmp_path / "sdist")) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (source,) = tmp_path.glob("photostrip-*/")
+    wheel = build("wheel", tmp_path / "built", source)
     venv.create(tmp_path / "empty", symlinks=True)
     python, command = (str(tmp_path / "empty/bin" / name) for name in ("python", "photostrip"))
     (packages,) = tmp_path.glob("empty/lib/python3.*/site-packages")
@@ -120,22 +105,14 @@ def test_the_wheel_runs_in_an_environment_that_has_what_it_asks_for_and_nothing_
     assert (tmp_path / "page.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 
 
-def needs() -> dict[str, str]:
-    """Give the libraries that pyproject.toml asks for, with their lower bounds."""
+def test_the_recipe_asks_for_the_same_libraries_and_the_citation_is_of_this_version() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    return dict(each.split(">=") for each in nonempty(project["dependencies"]))
-
-
-def test_the_recipe_asks_for_the_same_libraries() -> None:
     recipe = yaml.safe_load((ROOT / "conda.recipe/meta.yaml").read_text(encoding="utf-8"))
     listed = dict(each.split(" >=") for each in recipe["requirements"]["run"])
     assert listed.pop("python") == "3.11"
-    assert listed == needs()
+    assert listed == dict(each.split(">=") for each in nonempty(project["dependencies"]))
     assert recipe["package"]["version"] == photostrip.__version__
     assert recipe["build"]["entry_points"] == ["photostrip = photostrip.cli.main:main"]
-
-
-def test_the_citation_is_of_this_version() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert (citation["title"], citation["version"]) == ("photostrip", photostrip.__version__)
 
@@ -145,20 +122,13 @@ def test_a_release_asks_for_one_version_and_hands_out_no_secret(tmp_path: Path) 
     workflow = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8"))
     (step,) = [each for each in workflow["jobs"]["build"]["steps"] if "CITATION" in each.get("name", "")]
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace(" (not released)", "")
-    for name, text in (
-        ("CITATION.cff", (ROOT / "CITATION.cff").read_text(encoding="utf-8")),
-        ("CHANGELOG.md", changelog),
-    ):
-        (tmp_path / name).write_text(text, encoding="utf-8")
+    shutil.copy(ROOT / "CITATION.cff", tmp_path)
+    (tmp_path / "CHANGELOG.md").write_text(changelog, encoding="utf-8")
 
     def stops(tag: str) -> bool:
         script = step["run"].replace("python -c", f"PYTHONPATH={ROOT} {sys.executable} -c")
-        ended = subprocess.run(
-            ["bash", "-eo", "pipefail", "-c", script],
-            cwd=tmp_path,
-            env=os.environ | {"GITHUB_REF_NAME": tag},
-            check=False,
-        )
+        environment = os.environ | {"GITHUB_REF_NAME": tag}
+        ended = subprocess.run(["bash", "-eo", "pipefail", "-c", script], cwd=tmp_path, env=environment, check=False)
         return ended.returncode != 0
 
     assert not stops(f"v{photostrip.__version__}")

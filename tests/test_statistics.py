@@ -42,9 +42,6 @@ def test_printed_quantiles() -> None:
         assert f_p_value(printed, *dofs) == pytest.approx(upper, rel=0.002)
 
 
-# ----------------------------------------------------------------------------------------- Grubbs and tau
-
-
 @pytest.mark.parametrize("example", cases("grubbs", "grubbs-critical"))
 def test_limits_of_grubbs_in_the_formula_book(example: Vector) -> None:
     table = example.expected["table"]
