@@ -1,15 +1,11 @@
-"""The parts of the gate on their own: slips of digits, flight, layout of the control, angles, fits.
-
-What image coordinates alone say against themselves: units, order, overlap, photos that are twice or mirrored.
-
-Every cause that competes in an adjustment is described, by what can tell of it.
-"""
+"""The parts of the gate on their own: slips of digits, units, order, flight, angles, ties, and what tells a cause."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
@@ -35,15 +31,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.notes import Finding
+    from photostrip.plausibility import mosaic
     from photostrip.simulation import Simulation
 
 
-@given(
-    value=st.integers(100_000_000, 999_999_999),
-    place=st.integers(1, 5),
-    digit=st.integers(0, 9),
-    noise=st.floats(-0.05, 0.05),
-)
+@given(st.integers(100_000_000, 999_999_999), st.integers(1, 5), st.integers(0, 9), st.floats(-0.05, 0.05))
 @settings(max_examples=60)
 def test_any_single_wrong_digit_is_put_right(value: int, place: int, digit: int, noise: float) -> None:
     text = str(value)
@@ -168,6 +160,14 @@ def test_one_photo_listed_far_from_its_place_is_named_alone() -> None:
     (finding,) = found(made.observations, wrong)
     assert (finding.code, finding.photos) == ("P201", (photos[1],))
     assert f"between {photos[0]} and {photos[2]}" in finding.message
+
+
+def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
+    """Four photos, one base apart along x, listed in the order 2, 0, 3, 1; photo 4 is not in the list."""
+    way = np.array([1.0, 1.0, 1.0, 5.0]) + 0j
+    photo = np.array([[2, 0], [0, 3], [3, 1], [4, 2]])
+    links = cast("mosaic.PhotoLinks", SimpleNamespace(photo=photo, bases=(way, -way), count=np.full(4, 6)))
+    assert flight._steps(links, [2, 0, 3, 1]) == pytest.approx([1.0] * 4)
 
 
 def test_every_hypothesis_is_described_in_the_order_of_precedence() -> None:
