@@ -259,6 +259,14 @@ def test_good_measurements_stay(alpha: float | None, share: float) -> None:
     assert out <= share * total
 
 
+def test_the_shift_of_the_test_and_its_limits() -> None:
+    """Baarda's table: 4.13 for levels of 0.1 % and 80 %; 2.80 for 5 % and 80 %; tau of ten for 5 %: Pope 1976."""
+    assert [reliability.noncentrality(alpha, 0.80) for alpha in (0.001, 0.05)] == pytest.approx([4.13, 2.80], abs=0.005)
+    assert reliability.limit("baarda", 0.001, 100) == pytest.approx(3.291, abs=0.001)
+    assert reliability.limit("tau", 0.001, 10**6) == pytest.approx(3.291, abs=0.001)
+    assert [reliability.limit("tau", 0.05, r) for r in (10, 1)] == pytest.approx([1.904, np.inf], abs=0.005)
+
+
 @pytest.mark.slow
 def test_errors_of_the_detectable_size_are_found_as_often_as_said() -> None:
     """Monte Carlo over the noise: the first test of an observation with an error of its detectable size."""

@@ -20,18 +20,8 @@ from photostrip.pipeline import gate
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.plausibility import KINDS
-from photostrip.simulation import (
-    Control,
-    Flight,
-    Gnss,
-    Ground,
-    Image,
-    Spec,
-    Terrain,
-    simulate,
-)
-from tests.pipeline.blocks import orientations
-from tests.results import write_project
+from photostrip.simulation import Control, Flight, Gnss, Ground, Image, Spec, Terrain, simulate
+from tests.pipeline.blocks import moved, orientations, used_rows
 from tests.simulated import inputs_of, settings_of
 from tests.source_tree import ROOT
 
@@ -56,24 +46,21 @@ FRAMES = {
     "geocentric": Ground("geocentric", ("x", "y", "z")),
     "local": Ground("local"),
 }
-BANDS = Control(bands=4, per_band=3, check=6)
-
-
-def strip(frame: str = "utm") -> Spec:
-    """Describe a strip over hills."""
-    return Spec(
-        seed=5,
-        ground=FRAMES[frame],
-        flight=Flight(photos=7, heading_deg=40.0, end_lap_percent=62.0),
-        terrain=Terrain(relief=120.0),
-        control=BANDS,
-    )
 
 
 @cache
 def simulation(frame: str = "utm") -> Simulation:
     """Simulate a strip over hills."""
-    return simulate(strip(frame))
+    flight = Flight(photos=7, heading_deg=40.0, end_lap_percent=62.0)
+    control, terrain = Control(bands=4, per_band=3, check=6), Terrain(relief=120.0)
+    return simulate(Spec(seed=5, ground=FRAMES[frame], flight=flight, terrain=terrain, control=control))
+
+
+def written(folder: Path, files: dict[str, str], more: str = "") -> Path:
+    """Write the files of a project, with more lines at the end of it."""
+    for path, text in files.items():
+        (folder / path).write_text(text + (more if path == "project.yaml" else ""), encoding="utf-8")
+    return folder / "project.yaml"
 
 
 def findings_of(inputs: Inputs, settings: Settings | None = None) -> tuple[Finding, ...]:
@@ -84,30 +71,11 @@ def findings_of(inputs: Inputs, settings: Settings | None = None) -> tuple[Findi
         return error.findings
 
 
-def codes(findings: tuple[Finding, ...]) -> list[str]:
-    """Give the codes of findings."""
-    return sorted({each.code for each in findings})
-
-
 def planted_in(case: planted.Case, name: str) -> planted.Planted:
     """Give the inputs with a mistake of the benchmark, and the ids that it concerns."""
     wrong = planted.mistake(name).plant(case)
     assert wrong is not None
     return wrong
-
-
-def with_control(inputs: Inputs, change: Callable[[Floats], Floats]) -> Inputs:
-    """Change the given coordinates east, north, up."""
-    return replace(inputs, control=replace(inputs.control, enu=change(inputs.control.enu.copy())))
-
-
-def control_rows(inputs: Inputs) -> NDArray[np.intp]:
-    """Give the rows of control points that are measured."""
-    control = inputs.control
-    return np.flatnonzero(~control.check & np.isin(control.ids, inputs.observations.point_ids))
-
-
-# -------------------------------------------------------------------------------------------------- nothing wrong
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -117,24 +85,12 @@ def test_a_sound_project_has_no_finding(frame: str) -> None:
     assert gate.of_inputs(inputs_of(made), settings_of(made)) == ()
 
 
-# ------------------------------------------------------------------------------------------------------- one mistake
-
-
-def in_bulgaria(folder: Path, second: str | None = None) -> Path:
-    """Write a strip over the border of two zones of 1942, for whose datum EPSG names countries farther north."""
-    spec = Spec(
-        seed=3,
-        ground=Ground("EPSG:28404", center_deg=(24.0, 42.5)),
-        flight=Flight(photos=8, heading_deg=90.0),
-        control=Control(every=2, check=6, second_crs=second, boundary_longitude_deg=24.0 if second else None),
-    )
-    return write_project(folder, spec)
-
-
 def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
-    project = in_bulgaria(tmp_path)
-    text = project.read_text(encoding="utf-8").replace("EPSG:28404", "EPSG:28405")
-    project.write_text(text, encoding="utf-8")
+    """Over Bulgaria, at the border of two zones of 1942, for whose datum EPSG names countries farther north."""
+    ground, flight = Ground("EPSG:28404", center_deg=(24.0, 42.5)), Flight(photos=8, heading_deg=90.0)
+    files = project_files(simulate(Spec(seed=3, ground=ground, flight=flight, control=Control(every=2, check=6))))
+    files["project.yaml"] = files["project.yaml"].replace("EPSG:28404", "EPSG:28405")
+    project = written(tmp_path, files)
     (finding,) = photostrip.check(project).findings
     assert (finding.code, finding.key) == ("P402", "control[0].crs")
     assert finding.fix == "name the crs of zone 4, with which its eastings begin"
@@ -147,50 +103,34 @@ def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("frame", ["utm", "south"])
 def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: float) -> None:
     """North of the equator such numbers lie beside their zone, near its origin: runs were called good."""
-    (finding,) = findings_of(with_control(inputs_of(simulation(frame)), lambda enu: enu * factor))
+    inputs = inputs_of(simulation(frame))
+    (finding,) = findings_of(moved(inputs, np.arange(len(inputs.control)), inputs.control.enu * (factor - 1.0)))
     assert finding.code == "P402"
     assert finding.evidence["factor"] == pytest.approx(1 / factor)
 
 
-@pytest.mark.parametrize(
-    ("role", "axis", "step"),
-    [
-        ("control", 0, 7000.0),
-        ("control", 2, 30.0),
-        ("control", 1, 5.0),
-        ("check", 0, 1000.0),
-        ("check", 1, -20.0),
-        ("check", 2, 30.0),
-    ],
-)
+@pytest.mark.parametrize("role", ["control", "check"])
+@pytest.mark.parametrize(("axis", "step"), [(0, 7000.0), (1, -20.0), (1, 5.0), (2, 30.0)])
 def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role: str) -> None:
     inputs = inputs_of(simulation("utm"))
-    row = int(control_rows(inputs)[4] if role == "control" else np.flatnonzero(inputs.control.check)[1])
+    row = int(used_rows(inputs)[4] if role == "control" else np.flatnonzero(inputs.control.check)[1])
     name = inputs.control.ids[row]
     text = f"{inputs.control.enu[row, axis]:.3f}"
     place = text.index(".") - 1 - int(np.log10(abs(step)))
     if not 0 <= int(text[place]) + np.sign(step) * int(str(abs(step))[0]) <= 9:
         step = -step  # a digit that would carry over is no single wrong digit
 
-    def slip(enu: Floats) -> Floats:
-        enu[row, axis] += step
-        return enu
-
-    (finding,) = findings_of(with_control(inputs, slip))
+    (finding,) = findings_of(moved(inputs, np.array([row]), step * np.eye(3)[axis]))
     assert (finding.code, finding.points, finding.severity) == ("P406", (name,), "warning")
     assert "typing error" in finding.message
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
 
 
-# ------------------------------------------------------------------------------------------------ several at once
-
-
 def four_faults(folder: Path, frame: str) -> tuple[Path, str]:
     """Write a project with a wrong unit, an exchanged pair, left-handed control and a slip of a digit."""
     made = simulation(frame)
-    files = project_files(made)
+    files, photos = project_files(made), made.strips[0][1]
     project = files["project.yaml"]
-    photos = made.strips[0][1]
     assert "unit: mm" in project
     project = project.replace("unit: mm", "unit: um").replace("sigma: 0.005", "sigma: 5")
     listed = project.index(f'"{photos[2]}"'), project.index(f'"{photos[3]}"')
@@ -202,9 +142,7 @@ def four_faults(folder: Path, frame: str) -> tuple[Path, str]:
     wrong = f"{x[:digit]}{(int(x[digit]) + 4) % 10}{x[digit + 1 :]}"
     rows[5] = ",".join([name, wrong, *rest])
     files["control.csv"] = "\n".join(rows) + "\n"
-    for path, text in files.items():
-        (folder / path).write_text(text, encoding="utf-8")
-    return folder / "project.yaml", name
+    return written(folder, files), name
 
 
 @pytest.mark.slow
@@ -227,12 +165,10 @@ def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: 
 @pytest.mark.slow
 def test_what_is_accepted_is_told_and_no_longer_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = simulation("utm")
-    for path, text in project_files(made).items():
-        (tmp_path / path).write_text(text, encoding="utf-8")
-    rows = (tmp_path / "control.csv").read_text(encoding="utf-8").splitlines()
-    gone = [row for row in rows if not row.startswith("G") or made.control.ids.index(row.split(",")[0]) < 4]
-    (tmp_path / "control.csv").write_text("\n".join(gone) + "\n", encoding="utf-8")
-    project = tmp_path / "project.yaml"
+    files = project_files(made)
+    rows = files["control.csv"].splitlines(keepends=True)
+    kept = [row for row in rows if not row.startswith("G") or made.control.ids.index(row.split(",")[0]) < 4]
+    project = written(tmp_path, files | {"control.csv": "".join(kept)})
     assert main(["check", str(project), "--quiet"]) == 0
     first = capsys.readouterr().out
     assert "warning: " in first
@@ -248,11 +184,8 @@ def test_what_is_accepted_is_told_and_no_longer_counts(tmp_path: Path, capsys: p
 
 
 def test_a_finding_that_does_not_exist_cannot_be_accepted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for path, text in project_files(simulation("utm")).items():
-        (tmp_path / path).write_text(text, encoding="utf-8")
-    with (tmp_path / "project.yaml").open("a", encoding="utf-8") as file:
-        file.write("accept: [P999]\n")
-    assert main(["check", str(tmp_path / "project.yaml"), "--quiet"]) == 2
+    project = written(tmp_path, project_files(simulation("utm")), "accept: [P999]\n")
+    assert main(["check", str(project), "--quiet"]) == 2
     assert "there is no finding `P999`" in capsys.readouterr().out
 
 
@@ -262,9 +195,7 @@ def test_images_that_no_lens_makes_are_refused_until_they_are_accepted(
 ) -> None:
     files = project_files(simulation("local"))
     wrong = files["project.yaml"].replace("principal_distance: 153", "principal_distance: 1530")
-    for path, text in (files | {"project.yaml": wrong}).items():
-        (tmp_path / path).write_text(text, encoding="utf-8")
-    project = tmp_path / "project.yaml"
+    project = written(tmp_path, files | {"project.yaml": wrong})
     assert main(["run", str(project), "--quiet"]) == 2
     printed = capsys.readouterr()
     assert "nothing is adjusted, unless `accept: [P105]`" in printed.out + printed.err
@@ -282,20 +213,15 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
     cells = [row.split(",") for row in rows]
     for row in cells:
         row[height] = row[height] and str(float(row[height]) / FOOT)
-    files["project.yaml"] += "processing: {adjustment: polynomial}\n"
     files["control.csv"] = "\n".join([head, *map(",".join, cells), ""])
-    for path, text in files.items():
-        (tmp_path / path).write_text(text, encoding="utf-8")
-    assert main(["run", str(tmp_path / "project.yaml"), "--format", "json"]) == 1
+    project = written(tmp_path, files, "processing: {adjustment: polynomial}\n")
+    assert main(["run", str(project), "--format", "json"]) == 1
     document = json.loads(capsys.readouterr().out)
     assert document["status"] == "failed"
     assert document["findings"]["code"] == ["P405"]
     text, *_ = document["verdict"]["look_at"]
     assert text.startswith("P405 ")
     assert "heights in feet" in text
-
-
-# ------------------------------------------------------------------------------------------------- given cameras
 
 
 @pytest.mark.parametrize(
@@ -331,11 +257,8 @@ def test_a_bundle_that_fails_is_explained_by_strips_adjusted_each_by_itself() ->
     """Three ids that each stand for two points of two strips bend the start of the bundle until rays run parallel."""
     with pytest.raises(photostrip.GeometryError) as caught:
         photostrip.run(ROOT / "tests" / "data" / "shared-ids" / "project.yaml")
-    assert {(each.code, *each.points) for each in caught.value.findings} == {
-        ("P301", "T000009"),
-        ("P301", "T000022"),
-        ("P301", "T000024"),
-    }
+    told = {(each.code, *each.points) for each in caught.value.findings}
+    assert told == {("P301", name) for name in ("T000009", "T000022", "T000024")}
 
 
 BOTH = {  # named by `check` and `run`; the seed of a small project
@@ -395,9 +318,7 @@ BY_RUN = {
 def test_a_mistake_is_what_is_named_first(name: str) -> None:
     mistake = planted.mistake(name)
     case = mistake.make((BOTH | BY_RUN)[name])
-    wrong = mistake.plant(case)
-    assert wrong is not None
-    inputs, ids = wrong
+    inputs, ids = planted_in(case, name)
     found = causes.told(inputs, mistake.settings(case))
     assert causes.names_it(found.run[0], mistake, ids)
     assert any(causes.names_it(each, mistake, ids) for each in found.check) == (name in BOTH)
@@ -407,14 +328,12 @@ def test_a_mistake_is_what_is_named_first(name: str) -> None:
 BLOCK = Spec(
     seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()
 )
-HILLS = Terrain(relief=60.0)
 BUNDLE = Settings(adjustment="bundle")
 
 
-def codes_of(inputs: Inputs, settings: Settings) -> list[str]:
+def codes_of(inputs: Inputs, settings: Settings) -> set[str]:
     """Collect codes of `check` and of `run`."""
-    findings = (*gate.of_inputs(inputs, settings), *triangulate(inputs, settings).findings)
-    return sorted({each.code for each in findings})
+    return {each.code for each in (*gate.of_inputs(inputs, settings), *triangulate(inputs, settings).findings)}
 
 
 SMALL = {  # layouts of the benchmark, and a seed that makes a small project
@@ -450,15 +369,11 @@ def test_a_sound_project_has_no_finding_however_it_is_laid_out(name: str) -> Non
 @pytest.mark.parametrize(("photos", "camera_height"), [(40, 1500.0), (110, 4000.0)])
 def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, camera_height: float) -> None:
     """Level ground says nothing of the principal distance, however the strip bends."""
-    spec = Spec(
-        seed=80,
-        flight=Flight(photos=photos, flying_height=camera_height),
-        terrain=Terrain(relief=0.0),
-        control=Control(every=6, per_band=2),
-        image=Image(sigma_um=8.0),
-    )
+    flight, terrain = Flight(photos=photos, flying_height=camera_height), Terrain(relief=0.0)
+    control, image = Control(every=6, per_band=2), Image(sigma_um=8.0)
+    spec = Spec(seed=80, flight=flight, terrain=terrain, control=control, image=image)
     made = simulate(spec)
-    assert codes_of(inputs_of(made), settings_of(made)) == []
+    assert codes_of(inputs_of(made), settings_of(made)) == set()
 
 
 @pytest.mark.slow
@@ -468,7 +383,7 @@ def test_a_start_may_be_far_off() -> None:
     given = orientations(made, observed=False)
     rng = np.random.default_rng(5)
     far = replace(given, enu=given.enu + rng.normal(0.0, 500.0, given.enu.shape) - [0.0, 0.0, 1500.0])
-    assert codes_of(replace(inputs_of(made), orientations=far), BUNDLE) == []
+    assert codes_of(replace(inputs_of(made), orientations=far), BUNDLE) == set()
     observed = replace(far, observed=True, sigma=np.full(far.enu.shape, 500.0), sigma_turns=np.full(far.enu.shape, 1.0))
     assert "P204" in codes_of(replace(inputs_of(made), orientations=observed), BUNDLE)
 
@@ -476,5 +391,6 @@ def test_a_start_may_be_far_off() -> None:
 @pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
 def test_the_bend_of_a_long_strip_is_no_typing_error(adjustment: str) -> None:
     """A check point between two bands lies metres from where a low polynomial puts it."""
-    made = simulate(Spec(seed=10, flight=Flight(photos=60), control=Control(every=15), terrain=HILLS))
-    assert codes_of(inputs_of(made), replace(settings_of(made), adjustment=adjustment)) == []
+    terrain, control = Terrain(relief=60.0), Control(every=15)
+    made = simulate(Spec(seed=10, flight=Flight(photos=60), control=control, terrain=terrain))
+    assert codes_of(inputs_of(made), replace(settings_of(made), adjustment=adjustment)) == set()

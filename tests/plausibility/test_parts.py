@@ -1,9 +1,4 @@
-"""The parts of the gate on their own: slips of digits, flight, layout of the control, angles, fits.
-
-What image coordinates alone say against themselves: units, order, overlap, photos that are twice or mirrored.
-
-Every cause that competes in an adjustment is described, by what can tell of it.
-"""
+"""The parts of the gate on their own: slips of digits, units, order, flight, angles, ties, and what tells a cause."""
 
 from __future__ import annotations
 
@@ -20,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.network.hypotheses import DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER
 from photostrip.network.reliability import CONTROL, IMAGE, POSITION
-from photostrip.plausibility import KINDS, flight, mosaic, units
+from photostrip.plausibility import KINDS, flight, units
 from photostrip.plausibility.finding import CAUSES
 from photostrip.plausibility.given_points import slip
 from photostrip.plausibility.ids import TiesOfStrips, odd_ties
@@ -36,18 +31,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.notes import Finding
+    from photostrip.plausibility import mosaic
     from photostrip.simulation import Simulation
 
 
-# --------------------------------------------------------------------------------------------------------- digits
-
-
-@given(
-    value=st.integers(100_000_000, 999_999_999),
-    place=st.integers(1, 5),
-    digit=st.integers(0, 9),
-    noise=st.floats(-0.05, 0.05),
-)
+@given(st.integers(100_000_000, 999_999_999), st.integers(1, 5), st.integers(0, 9), st.floats(-0.05, 0.05))
 @settings(max_examples=60)
 def test_any_single_wrong_digit_is_put_right(value: int, place: int, digit: int, noise: float) -> None:
     text = str(value)
@@ -82,52 +70,27 @@ def test_what_is_within_noise_is_no_slip(off: float) -> None:
     assert slip(434733.71, 434733.71 + off, 0.05, 0.2) is None
 
 
-# --------------------------------------------------------------------------------------------------------- flight
-
-
-def straight(photos: int = 8) -> Floats:
-    """Give perspective centres of a straight level flight, base 100, at height 150."""
-    return np.column_stack([100.0 * np.arange(photos), np.zeros(photos), np.full(photos, 150.0)])
-
-
-def flown(centers: Floats, depth: Floats | None = None) -> list[tuple[str, tuple[str, ...]]]:
-    """Examine a flight."""
-    names = [f"{number}" for number in range(len(centers))]
-    height = np.full(len(centers), 150.0) if depth is None else depth
-    up = np.array([0.0, 0.0, 1.0])
-    return [(each.code, each.photos) for each in flight.find_odd_centers(centers, height, up, names, "A")]
-
-
 @given(st.integers(0, 10_000))
 @settings(max_examples=40, deadline=None)
 def test_a_usual_flight_has_no_finding(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    centers = straight(10) + rng.normal(0.0, [5.0, 5.0, 3.0], (10, 3)).clip(-12, 12)
-    assert flown(centers) == []
-
-
-# --------------------------------------------------------------------------------------------------------- angles
-
-
-def attitudes(count: int = 6) -> tuple[Floats, Floats]:
-    """Give omega, phi, kappa and the rotations they stand for, by a library that is not ours."""
-    rng = np.random.default_rng(4)
-    values = np.column_stack([rng.normal(0, np.radians(2), (count, 2)), rng.uniform(-3, 3, count)])
-    return values, Rotation.from_euler("XYZ", values).as_matrix()
+    """Straight and level, base 100 at height 150."""
+    centers = np.column_stack([100.0 * np.arange(10), np.zeros(10), np.full(10, 150.0)])
+    centers += np.random.default_rng(seed).normal(0.0, [5.0, 5.0, 3.0], (10, 3)).clip(-12, 12)
+    names = [f"{number}" for number in range(10)]
+    assert list(flight.find_odd_centers(centers, np.full(10, 150.0), np.array([0.0, 0.0, 1.0]), names, "A")) == []
 
 
 def test_yaw_pitch_roll_of_a_gimbal() -> None:
     """Where a camera that is stated to look down looks ahead, pitch lies about -90 degrees."""
-    _, matrices = attitudes()
-    names = [f"{number}" for number in range(len(matrices))]
+    rng = np.random.default_rng(4)
+    values = np.column_stack([rng.normal(0, np.radians(2), (6, 2)), rng.uniform(-3, 3, 6)])
+    matrices = Rotation.from_euler("XYZ", values).as_matrix()  # by a library that is not ours
+    names = [f"{number}" for number in range(6)]
     gimbal = Rotation.from_matrix(matrices) * Rotation.from_euler("x", -90, degrees=True)
     stated = gimbal.as_euler("ZXY") * [-1, 1, 1]
     (finding,) = flight.find_wrong_angles(stated, "yaw-pitch-roll", matrices, names)
     assert finding.code == "P602"
     assert "of a camera that looks ahead where pitch and roll are zero" in finding.message
-
-
-# --------------------------------------------------------------------------------------------------------- ties
 
 
 @given(st.integers(0, 10_000), st.integers(0, 2))
@@ -143,16 +106,8 @@ def test_ties_of_two_points_are_found_beside_the_bend_of_two_strips(seed: int, d
     wrong = rng.choice(count, 3, replace=False)
     turned = rng.uniform(0, 2 * np.pi, 3)
     off[wrong] += np.column_stack([np.cos(turned), np.sin(turned)]) * rng.uniform(20, 1e4, 3)[:, None]
-    ties = TiesOfStrips(
-        points=np.arange(count),
-        names=tuple(f"T{number}" for number in range(count)),
-        plan=plan,
-        difference=off,
-        rays=np.full(count, 3),
-        sigma=0.1,
-        depth=1500.0,
-        strips=("A", "B"),
-    )
+    names, rays = tuple(f"T{number}" for number in range(count)), np.full(count, 3)
+    ties = TiesOfStrips(np.arange(count), names, plan, off, rays, sigma=0.1, depth=1500.0, strips=("A", "B"))
     odd = odd_ties(ties)
     assert odd is not None
     assert odd.rows.tolist() == sorted(wrong.tolist())
@@ -160,13 +115,10 @@ def test_ties_of_two_points_are_found_beside_the_bend_of_two_strips(seed: int, d
     assert np.delete(odd.far, wrong).max() < 1.0
 
 
-PHOTOS = 7
-
-
 @cache
 def simulation(heading: float = 70.0, end_lap: float = 62.0) -> Simulation:
     """Give a short strip."""
-    return simulate(Spec(seed=3, flight=Flight(photos=PHOTOS, heading_deg=heading, end_lap_percent=end_lap)))
+    return simulate(Spec(seed=3, flight=Flight(photos=7, heading_deg=heading, end_lap_percent=end_lap)))
 
 
 def found(observations: PhotoPoints, photos: Sequence[str]) -> list[Finding]:
@@ -174,27 +126,14 @@ def found(observations: PhotoPoints, photos: Sequence[str]) -> list[Finding]:
     return flight.find_wrong_order(observations, "A", photos)[0]
 
 
-def codes(findings: Sequence[Finding]) -> list[str]:
-    """Give the codes of findings."""
-    return [each.code for each in findings]
-
-
-def changed(observations: PhotoPoints, photo: str, by: complex, *, mirror: bool = False) -> PhotoPoints:
-    """Multiply the coordinates of one photo, as complex numbers, after mirroring them."""
-    rows = observations.photo == observations.photo_ids.index(photo)
-    z = observations.xy[rows, 0] + 1j * observations.xy[rows, 1]
-    z = by * (np.conj(z) if mirror else z)
-    xy = observations.xy.copy()
-    xy[rows] = np.column_stack([z.real, z.imag])
-    return replace(observations, xy=xy)
-
-
 @given(heading=st.sampled_from([0.0, 70.0, 200.0]), lap=st.sampled_from([58.0, 62.0, 80.0]), turn=st.floats(-3.1, 3.1))
 @settings(max_examples=12, deadline=None)
 def test_a_sound_strip_has_no_finding_in_either_direction(heading: float, lap: float, turn: float) -> None:
     made = simulation(heading, lap)
     photos = made.strips[0][1]
-    turned = changed(made.observations, photos[2], np.exp(1j * turn))  # a photo turned in the comparator is no mistake
+    points = made.observations
+    z = (points.xy[:, 0] + 1j * points.xy[:, 1]) * np.exp(1j * turn * (points.photo == 2))
+    turned = replace(points, xy=np.column_stack([z.real, z.imag]))  # one photo turned in the comparator is no mistake
     assert found(turned, photos) == []
     assert found(turned, photos[::-1]) == []
     assert flight.find_wrong_order(turned, "A", photos)[1].photos == photos
@@ -225,12 +164,10 @@ def test_one_photo_listed_far_from_its_place_is_named_alone() -> None:
 
 def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
     """Four photos, one base apart along x, listed in the order 2, 0, 3, 1; photo 4 is not in the list."""
-    links = SimpleNamespace(
-        photo=np.array([[2, 0], [0, 3], [3, 1], [4, 2]]),
-        bases=(np.array([1.0, 1.0, 1.0, 5.0]) + 0j, -np.array([1.0, 1.0, 1.0, 5.0]) + 0j),
-        count=np.array([6, 6, 6, 6]),
-    )
-    assert flight._steps(cast("mosaic.PhotoLinks", links), [2, 0, 3, 1]) == pytest.approx([1.0] * 4)
+    way = np.array([1.0, 1.0, 1.0, 5.0]) + 0j
+    photo = np.array([[2, 0], [0, 3], [3, 1], [4, 2]])
+    links = cast("mosaic.PhotoLinks", SimpleNamespace(photo=photo, bases=(way, -way), count=np.full(4, 6)))
+    assert flight._steps(links, [2, 0, 3, 1]) == pytest.approx([1.0] * 4)
 
 
 def test_every_hypothesis_is_described_in_the_order_of_precedence() -> None:
