@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
 
 
 def orthogonal_normal(rng: np.random.Generator, count: int, values: int) -> Floats:

@@ -13,10 +13,8 @@ from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 from tests.strips import LOCAL
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SIGMA = (0.010, 0.010, 0.015)  # mm
 SCALE = 9000.0

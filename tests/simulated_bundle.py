@@ -11,11 +11,7 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.network.problem import BundleCameras, BundleProblem, ControlObservations, ImageObservations, StartValues
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from photostrip.simulation.simulation import Simulation
-
-    Floats = NDArray[np.float64]
 
 
 def truth_of(simulation: Simulation) -> StartValues:

@@ -20,12 +20,11 @@ from photostrip.strip.relative_orientation import Pairs, collect_pairs, orient_p
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from photostrip.arrays import Floats
     from photostrip.strip.relative_orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 MICROMETRE = 1e-3  # mm
 LOCAL = FrameSpec("local", ("east", "north", "up"))

@@ -39,13 +39,8 @@ LAYERS = (
 # Rooms that may not use each other although their layers would allow it: (who, not whom).
 TAUGHT = {"errors", "notes", "visible"}  # all that a report may know of the program
 LEAVES = {"report"}
-APART = {
-    ("terrestrial", "strip"),
-    ("strip", "terrestrial"),
-    ("comparison", "strip"),
-    ("comparison", "network"),
-    ("comparison", "terrestrial"),
-}
+APART = {("terrestrial", "strip"), ("strip", "terrestrial")}
+APART |= {("comparison", room) for room in ("strip", "network", "terrestrial")}
 
 
 def room(module: str) -> str:

@@ -22,11 +22,8 @@ from tests.loops import nonempty
 from tests.vectors import cases
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from tests.vectors import Vector
-
-    Floats = NDArray[np.float64]
 
 
 def test_printed_quantiles() -> None:

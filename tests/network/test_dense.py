@@ -41,10 +41,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.arrays import Floats
     from photostrip.network.adjustment import BundleSolution, Cofactors
     from photostrip.simulation import Simulation
-
-    Floats = NDArray[np.float64]
 
 
 # Steps of the differences by parameter.

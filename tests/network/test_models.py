@@ -16,9 +16,7 @@ from photostrip.network.reliability import cofactors_of, coordinates_of, joint_c
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
 
 
 def network(models: int = 4, *, free: bool = False, correlated: bool = False) -> BundleProblem:

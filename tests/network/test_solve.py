@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -16,11 +15,6 @@ from photostrip.network.problem import BundleProblem, ControlObservations, Image
 from photostrip.simulation import Control as SimulatedControl
 from photostrip.simulation import Flight, Points, Spec, simulate
 from tests.simulated_bundle import problem_of, truth_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
 
 MICROMETRE = 1e-6  # metres on the ground
 

@@ -14,13 +14,9 @@ from photostrip.rejection import WRONG_RAY
 from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.pipeline.results import Result
     from tests.strips import Flown
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
