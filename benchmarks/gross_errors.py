@@ -40,6 +40,7 @@ from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
 from photostrip.strip.control_screening import EITHER, WRONG_IMAGE  # noqa: E402
+from tests.much_wrong_control import two_fifths_wrong  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -68,12 +69,6 @@ STRIP = Spec(
     control=Control(layout="bands", bands=7, per_band=3),
 )
 BLOCK = replace(STRIP, flight=replace(STRIP.flight, photos=12, strips=4))
-MUCH_WRONG = Spec(
-    flight=Flight(photos=13, end_lap_percent=62.0),
-    points=Points(rows=3, extra_per_model=8),
-    control=Control(layout="random", use={"xy": 0.2, "z": 0.2, "xyz": 0.6}, sigma=(0.02, 0.02, 0.02)),
-)
-SHARE, ERRORS, COUNT = 0.4, (5.0, 100.0), (14, 20)  # of the coordinates; m; control points
 WRONG_CONTROL = "wrong-control"
 KINDS = {
     "strips": STRIP,
@@ -356,36 +351,6 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range) -> None:
         middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)
         print(f"{kind:11s}{middle:32.3f}{most:12.3f}{largest:9.3f}")
     print(flush=True)
-
-
-def two_fifths_wrong(seed: int) -> tuple[int, int, int]:
-    """Adjust a strip of which two fifths of the control are wrong by 5 to 100 m, in plan or in height.
-
-    Coordinates of the control: those that are wrong, the wrong ones left out, sound ones left out.
-    """
-    rng = np.random.default_rng(seed)
-    spec = replace(MUCH_WRONG, control=replace(MUCH_WRONG.control, count=int(rng.integers(*COUNT))), seed=seed)
-    simulation = simulate(spec)
-    inputs = inputs_of(simulation)
-    control, bad = spoiled(inputs.control, rng)
-    result = triangulate(replace(inputs, control=control), settings_of(simulation))
-    (kept,) = (strip.control for strip in result.strips)
-    rows = [control.ids.index(name) for name in kept.ids]
-    bad, out = bad[rows], control.use[rows] & ~kept.use
-    return int(bad.sum()), int((bad & out).sum()), int((out & ~bad).sum())
-
-
-def spoiled(control: ControlPoints, rng: np.random.Generator) -> tuple[ControlPoints, Flags]:
-    """Spoil two fifths of the plan positions and of the heights; also which coordinates are wrong."""
-    given, enu, bad = control.use & ~control.check[:, None], control.enu.copy(), np.zeros(control.use.shape, bool)
-    for row in rng.permutation(np.flatnonzero(given.any(axis=1))).tolist():
-        axes = [axis for axis in ([0, 1], [2]) if given[row, axis[0]]]
-        part = axes[rng.integers(len(axes))]
-        if bad[:, part[0]].sum() + 1 <= SHARE * given[:, part[0]].sum():
-            error = rng.normal(size=len(part))
-            enu[row, part] += error / np.linalg.norm(error) * np.exp(rng.uniform(*np.log(ERRORS)))
-            bad[row, part] = True
-    return replace(control, enu=enu), bad
 
 
 def print_much_wrong(pool: Pool, seeds: range) -> None:

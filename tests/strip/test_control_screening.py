@@ -14,7 +14,6 @@ from scipy.linalg import cholesky, lstsq, solve_triangular
 from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
-from benchmarks.gross_errors import two_fifths_wrong
 from photostrip.arrays import Flags, Floats
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings
@@ -24,6 +23,7 @@ from photostrip.points import ControlPoints
 from photostrip.strip.absolute_orientation import Targets
 from photostrip.strip.control_screening import FoundErrors, JointAdjustment, StripAtControl, adjust, reliability
 from photostrip.strip.fitted_strip import Misclosures
+from tests.much_wrong_control import two_fifths_wrong
 from tests.strips import MICROMETRE, Flown, control_points, fly, project
 
 SEEDS = st.integers(0, 2**31)
