@@ -20,6 +20,7 @@ import warnings
 from collections import Counter
 from pathlib import Path
 from random import Random
+from statistics import median
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
@@ -55,8 +56,7 @@ def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
         row = [codes[command, code] for code in range(4)]
         other = sum(count for (name, _), count in codes.items() if name == command) - sum(row)
         print(f"{command:<10}" + "".join(f"{count:7d}" for count in (*row, other)))
-    seconds.sort()
-    print(f"seconds: median {seconds[len(seconds) // 2]:.3f}, largest {seconds[-1]:.3f}")
+    print(f"seconds: median {median(seconds):.3f}, largest {max(seconds):.3f}")
     print(f"wrong: {len(wrong)}", *wrong[:SHOWN], sep="\n  ")
     return 1 if wrong else 0
 
@@ -67,8 +67,7 @@ def main() -> int:
     parser.add_argument("what", nargs="*", metavar="[blocks] CASES SEED", help="projects of strips where blocks "
                         f"are not named; {CASES} cases, seed {SEED}")  # fmt: skip
     what = parser.parse_args().what
-    of_blocks = what[:1] == ["blocks"]
-    numbers = what[of_blocks:]
+    numbers = what[(of_blocks := what[:1] == ["blocks"]) :]
     if len(numbers) > 2 or not all(each.isdecimal() for each in numbers):
         parser.error("numbers are wanted: cases and seed")
     number, seed = [*map(int, numbers), *(CASES, SEED)[len(numbers) :]]
