@@ -41,13 +41,15 @@ def _number(value: float | None) -> float:
 
 def _with_ellipses(points: Table, frame: Document) -> Table:
     """Add covariances, and standard error ellipses in plan, to points whose standard deviations are known."""
-    if not {f"correlation_{pair}" for pair in MIXED} <= {*points.columns}:
+    known = {f"correlation_{pair}" for pair in MIXED} & {*points.columns}
+    if not known:
         return points
     sigma = np.column_stack([points[f"sigma_{axis}"] for axis in "xyz"])
     covariances, columns = np.empty((len(points), 3, 3)), {}
     covariances[:, range(3), range(3)] = sigma**2
     for pair, (k, j) in MIXED.items():
-        size = columns[f"cov_{pair}"] = points[f"correlation_{pair}"] * sigma[:, k] * sigma[:, j]
+        correlation = points[f"correlation_{pair}"] if f"correlation_{pair}" in known else np.nan  # somebody edited it
+        size = columns[f"cov_{pair}"] = correlation * sigma[:, k] * sigma[:, j]
         covariances[:, k, j] = covariances[:, j, k] = size
     axes = level(frame, np.column_stack([points[axis] for axis in "xyz"]))
     (larger, smaller), azimuth = ellipses(axes @ covariances @ axes.transpose(0, 2, 1))

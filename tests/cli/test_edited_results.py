@@ -180,6 +180,14 @@ def test_a_missing_key_is_told_with_all_that_lead_to_it(more: list[str], tmp_pat
     assert (code, "models.left: is missing" in err) == (2, True)
 
 
+def test_a_result_without_one_correlation_has_no_ellipses(tmp_path: Path, call: Call) -> None:
+    document = json.loads(RESULT.read_text(encoding="utf-8"))
+    del document["points"]["correlation_xy"]
+    (file := tmp_path / "result.json").write_text(to_json(document), encoding="utf-8")
+    code, out, _ = call("report", file, "--section", "precision")
+    assert (code, "ellipse a" in out) == (0, True)
+
+
 @pytest.mark.parametrize("options", [["report"], ["statement"], ["compare", str(RESULT)], ["compare", "--again"]])
 @pytest.mark.parametrize(
     ("content", "words"),
