@@ -247,7 +247,10 @@ def scale_transfer(first: ArrayLike, second: ArrayLike, weights: ArrayLike | Non
     one, other = _array(first, 3), _array(second, 3)
     _same(one, other)
     weight = _weights(weights, len(one))
-    ratios = np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
+    before, after = np.linalg.norm(one, axis=1), np.linalg.norm(other, axis=1)
+    if not (before.all() and after.all()):
+        raise InputError("a point lies in the perspective centre: it has no ratio of distances")
+    ratios = before / after
     factor = float(weight @ ratios / weight.sum())
     return factor, ratios / factor - 1
 
@@ -263,7 +266,10 @@ def pair_scales(model: ArrayLike, ground: ArrayLike) -> PairScales:
     _same(source, target)
     if len(source) < 2:
         raise InputError("two points are needed, to have a distance")
-    return distances(source, target)
+    found = distances(source, target)
+    if not found.source.all():
+        raise InputError("two points lie at one place in the model: they have no ratio of distances")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +290,10 @@ def frame(geodetic: ArrayLike, *, azimuth: float = 0.0, ellipsoid: Ellipsoid = W
     Source: [001] eq. 142-144.
     """
     given = _array(geodetic, 3)
+    if (np.abs(given[:, :2]) > [2 * np.pi, np.pi / 2]).any():
+        raise InputError(
+            "latitudes lie between -90 and 90 degrees, longitudes between -360 and 360: are they exchanged?"
+        )
     cartesian = geocentric_from_geodetic(given, ellipsoid)
     lat, lon, _ = mean_position(given[:, 1], given[:, 0], given[:, 2])
     found = IntermediateFrame.at_centre(cartesian, lat, lon, azimuth)

@@ -508,7 +508,7 @@ class _Reader:
     def _positive(self, column: Column, lines: Numbers) -> None:
         values = self.numbers[column.name][-1]
         for row in np.flatnonzero(values < SMALLEST_LENGTH):
-            message = f"{values[row]:g} cannot be a standard deviation"
+            message = f"{values[row]:g} is out of range"
             self._add(int(lines[row]), column.name, message, "range", expected="a number larger than 0")
 
     def _clean(self, column: Column, codes: Numbers, lines: Numbers) -> tuple[Numbers, tuple[str, ...]]:

@@ -90,7 +90,7 @@ def test_weights_of_pass_points(alone: Alone) -> None:
         with pytest.raises(photostrip.InputError, match="3 weights are needed, 0 or more"):
             steps.scale_transfer(first, second, weights)
     code, _, err = alone.typed("scale", alone.write([*lines[:2], lines[2].replace(",3.0", ",-3.0")], "scale.csv"))
-    assert (code, "scale.csv:3:" in err) == (2, True)
+    assert (code, "scale.csv:3:43: weight: -3 is out of range" in err) == (2, True)
 
 
 def test_the_intermediate_frame_lies_in_its_azimuth(alone: Alone) -> None:
@@ -110,6 +110,16 @@ def test_the_intermediate_frame_lies_in_its_azimuth(alone: Alone) -> None:
         np.transpose(geocentric), abs=1e-4
     )
     assert np.array([[row["longitude"], row["latitude"]] for row in back]) == pytest.approx(np.array(places), abs=1e-9)
+
+
+def test_what_has_no_ratio_and_no_place_is_refused() -> None:
+    at_one_place, apart = np.zeros((2, 3)), np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    with pytest.raises(photostrip.InputError, match="lies in the perspective centre"):
+        steps.scale_transfer(apart + 1, at_one_place)
+    with pytest.raises(photostrip.InputError, match="two points lie at one place"):
+        steps.pair_scales(at_one_place, apart)
+    with pytest.raises(photostrip.InputError, match="are they exchanged"):
+        steps.frame(np.radians([[49.0, 115.0, 0.0]]))
 
 
 def test_the_earth_falls_away() -> None:
