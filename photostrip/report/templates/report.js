@@ -9,8 +9,8 @@ for (const table of document.querySelectorAll("main table")) {
     if (!head.textContent) return;
     const button = document.createElement("button");
     button.type = "button";
-    button.append(...head.childNodes);
-    head.append(button);
+    button.append(head.firstChild);
+    head.prepend(button);
     button.addEventListener("click", () => {
       const next = { none: "ascending", ascending: "descending", descending: "none" }[head.ariaSort ?? "none"];
       heads.forEach((each) => each.removeAttribute("aria-sort"));
