@@ -158,7 +158,7 @@ def run(
     depfile: Rule = None,
     trace: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write every iteration with the symbols of the formulas: .txt, .md, .json."),
+        typer.Option(metavar="FILE", help="Write every iteration with the formulas: .txt, .md, .html, .json."),
     ] = None,
     cross_validate: Annotated[
         bool, typer.Option("--cross-validate", help="Leave control out in turn, and compare the result there.")

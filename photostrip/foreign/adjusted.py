@@ -5,6 +5,7 @@ It is made from the document, so that a saved result gives the same files as the
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -106,10 +107,20 @@ class Adjusted:
 
     @cached_property
     def camera_of(self) -> tuple[str, ...]:
-        """Camera of each photo."""
+        """Camera of each photo; one that an adjustment found shifted or enlarged has one of its own."""
+        own = {each["camera"] for each in self._calibration}
+        photos = zip((each["id"] for each in self.photos), self.given_camera_of, strict=True)
+        return tuple(f"{name} of photo {photo}" * (f"of photo {photo}" in own) or name for photo, name in photos)
+
+    @cached_property
+    def given_camera_of(self) -> tuple[str, ...]:
         of_strip = {each["id"]: each["camera"] for each in self.document["strips"]}
         alone = {photo: each["id"] for each in self.document["cameras"] for photo in each.get("single_photos") or ()}
         return tuple(alone.get(each["id"]) or of_strip.get(each["strip"], "") for each in self.photos)
+
+    @cached_property
+    def _calibration(self) -> list[Document]:
+        return list(self.document.get("bundle", {}).get("calibration", ()))
 
     @cached_property
     def rays(self) -> tuple[Rays, ...]:
@@ -122,7 +133,7 @@ class Adjusted:
             if photo in measured and point in row_of and ray[0] is not None:
                 measured[photo].append((row_of[point], *ray))
         found = []
-        for number, (kept, camera) in enumerate(zip(measured.values(), self.camera_of, strict=True)):
+        for number, (kept, camera) in enumerate(zip(measured.values(), self.given_camera_of, strict=True)):
             columns = np.array(kept, float).reshape(-1, 4)
             points = columns[:, 0].astype(np.intp)
             xy = seen(self.xyz[points], self.centers[number], self.rotations[number])
@@ -132,15 +143,20 @@ class Adjusted:
     @cached_property
     def cameras(self) -> Mapping[str, FileCamera]:
         """The cameras of the photos, with the calibration that was found."""
-        estimated = {each["id"]: np.zeros(len(CALIBRATION)) for each in self.document["cameras"]}
+        estimated: dict[str, Floats] = defaultdict(lambda: np.zeros(len(CALIBRATION)))
         column = {each.title: number for number, each in enumerate(CALIBRATION.values())}
-        for each in self.document.get("bundle", {}).get("calibration", ()):
+        for each in self._calibration:
             estimated[each["camera"]][column[each["parameter"]]] = each["value"]
-        used = set(self.camera_of)
+        given = {each["id"]: each for each in self.document["cameras"]}
+        names = dict(zip(self.camera_of, self.given_camera_of, strict=True))
         return {
-            each["id"]: _in_file(_camera(each), estimated[each["id"]], self._edge(each["id"]))
-            for each in self.document["cameras"]
-            if each["id"] in used
+            name: _in_file(
+                _camera(given[like] | {"id": name}),
+                estimated[like] + estimated[name.removeprefix(f"{like} ") if name != like else ""],
+                self._edge(name),
+            )
+            for name, like in sorted(names.items(), key=lambda pair: list(given).index(pair[1]))
+            if like in given
         }
 
     def _edge(self, camera: str) -> Floats:

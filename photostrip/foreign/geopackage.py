@@ -149,7 +149,7 @@ def _columns(record: Document, names: Sequence[str]) -> Document:
 def _footprint(block: Adjusted, number: int) -> Floats | None:
     """Return where the corners of a photo meet the plane through its points; None where they do not, ahead of it."""
     rays = block.rays[number]
-    camera = next(each for each in block.document["cameras"] if each["id"] == block.camera_of[number])
+    camera = next(each for each in block.document["cameras"] if each["id"] == block.given_camera_of[number])
     if camera["format_mm"] is None:
         low, high = rays.xy.min(axis=0, initial=0.0), rays.xy.max(axis=0, initial=0.0)
         corners = (low + high) / 2.0 + CORNERS * (high - low)

@@ -256,13 +256,13 @@ class Result:
         return statement_document(self.document, self.name, classes_cm)
 
     def trace(self, form: str = "text") -> str:
-        """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.
+        """Return every iteration with the symbols of the formulas: ``text``, ``md``, ``html``, ``json`` or ``csv``.
 
         Raises InputError for a saved result: it holds no iterations; ValueError for another form.
         """
         if self.computed is None:
             raise InputError(Fault("a saved result holds no iterations", "result-saved", fix="run the project again"))
-        _require_form(form, ("text", "md", "json"))
+        _require_form(form, ("text", "md", "html", "json", "csv"))
         from photostrip.report.page.layout import WIDEST_PAGE
         from photostrip.sheets.trace import trace_sheet
 

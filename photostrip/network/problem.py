@@ -297,7 +297,7 @@ class BundleProblem:
         First calibration parameters (``camera RC30: k1``), then offsets and drifts of positions (``positions A: offset
         east``; the component counts along the rows of the axes).
         """
-        names, parameters = [], list(CALIBRATION)
+        names, parameters = [], [each.title.replace("_", " ") for each in CALIBRATION.values()]
         if self.cameras.sigma is not None:
             for camera, row in enumerate(self.cameras.sigma):
                 name = self.camera_ids[camera] if self.camera_ids else f"number {camera}"

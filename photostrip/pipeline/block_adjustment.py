@@ -107,10 +107,11 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
     taken_up = {(problem.camera_ids[camera], kinds[k].title) for camera, columns in places for k in columns}
     for parameter in bundle.parameters:
         if not parameter.significant and (parameter.camera, parameter.name) not in taken_up:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             text = (
-                f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
-                f"standard deviation of {parameter.sigma:.3g}: it does not differ significantly from "
-                "zero; leave it out of self_calibration"
+                f"camera {parameter.camera}: the correction of {parameter.name.replace('_', ' ')}, "
+                f"{parameter.value:.3g}{unit} (standard deviation {parameter.sigma:.3g}{unit}), does not differ "
+                "significantly from zero; leave it out of self_calibration"
             )
             yield Note("calibration-insignificant", text)
     common = set(bundle.screened.problem.common_names())

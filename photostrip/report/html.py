@@ -98,7 +98,8 @@ def _place(sections: list[Document], pictures: Sequence[Picture]) -> None:
     of_name = {section["name"]: section for section in sections}
     ground: Document = {"name": "", "id": "pictures", "title": "Pictures", "parts": [], "pictures": []}
     for each in pictures:
-        section = of_name.get(SECTIONS.get(each.name, ""), ground)
+        names = SECTIONS.get(each.name, "").split()
+        section = next((of_name[name] for name in names if name in of_name), ground)
         drawn = each._asdict() | {"svg": Markup(each.svg), "findings": []}  # noqa: S704 (escaped there)
         section["pictures"].append(drawn)
     if pictures:

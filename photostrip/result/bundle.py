@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
 from photostrip.network.hypotheses import ALL, DRIFT, HEIGHTS_ONLY, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
-from photostrip.network.observations import drift_columns
-from photostrip.network.problem import BundleProblem, BundleSettings
+from photostrip.network.observations import PRINCIPAL_DISTANCE, corrections, drift_columns
+from photostrip.network.problem import CALIBRATION, BundleProblem, BundleSettings
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
@@ -21,6 +22,7 @@ from photostrip.result.numbers import PER_RADIAN, attributes, record, rms
 from photostrip.result.points import ImageResiduals
 from photostrip.result.table import Table
 from photostrip.statistics import TEST_LEVEL
+from photostrip.strip.corrections import FORWARD
 from photostrip.units import MICROMETRES
 
 OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
@@ -100,7 +102,7 @@ def bundle_of(result: Result) -> Document:
                 for each in found.components
             ),
         ),
-        "calibration": Table.of_rows("bundle.calibration", _calibration(found)),
+        "calibration": Table.of_rows("bundle.calibration", _calibration(result, found)),
         "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
         "positions": Table.of_rows("bundle.positions", _positions(found)),
         "corrections": Table.of_rows("bundle.corrections", _corrections(found)),
@@ -128,20 +130,55 @@ def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, Gr
     }
 
 
-def _calibration(found: Bundle) -> list[Document]:
+def _calibration(result: Result, found: Bundle) -> list[Document]:
     """Return the parameters of the self-calibration: the first of the common unknowns."""
     covariance = found.screened.precision.common[: len(found.parameters), : len(found.parameters)]
     sigma = np.sqrt(np.diag(covariance))
-    return [
-        {
-            "parameter": each.name,
-            **attributes(each, "camera unit value sigma p significant"),
-            "sigma_a_priori": each.prior if np.isfinite(each.prior) else None,
-            "controlled": each.redundancy,
-            "correlations": row,
-        }
-        for each, row in zip(found.parameters, covariance / np.outer(sigma, sigma), strict=True)
-    ]
+    cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
+    problem, columns = found.screened.problem, [each.title for each in CALIBRATION.values()]
+    rows, like = [], np.arange(len(problem.camera_ids)) if problem.cameras.like is None else problem.cameras.like
+    for each, row in zip(found.parameters, covariance / np.outer(sigma, sigma), strict=True):
+        number, column = problem.camera_ids.index(each.camera), columns.index(each.name)
+        camera = cameras[problem.camera_ids[like[number]]]  # a photo that is shifted has one of its own like it
+        measured = problem.cameras.of_photo[problem.images.photo] == number
+        given = _given_calibration(camera)[column]
+        rows.append(
+            {
+                "parameter": each.name,
+                "given": given,
+                "adjusted": given + each.value,
+                **attributes(each, "camera unit value sigma p significant"),
+                "corner_um": abs(each.value) * _at_corner(camera, problem.images.xy[measured])[column] * MICROMETRES,
+                "sigma_a_priori": each.prior if np.isfinite(each.prior) else None,
+                "controlled": each.redundancy,
+                "correlations": row,
+            }
+        )
+    return rows
+
+
+def _given_calibration(camera: Camera) -> Floats:
+    """Return the calibration as it is given, (10,), in the order of ``CALIBRATION``; NaN for a table of distortion.
+
+    Distortion as it is added to image points; that which is added to ideal points to first order.
+    """
+    lens, coefficients = camera.distortion, np.zeros(7)
+    if lens is not None:
+        coefficients = np.array([*lens.k, *lens.p, *lens.b]) * (1.0 if lens.direction == FORWARD else -1.0)
+        coefficients[:3] += np.nan if lens.radius else 0.0
+    return np.array([camera.principal_distance, *camera.principal_point, *coefficients])
+
+
+def _at_corner(camera: Camera, measured: Floats) -> Floats:
+    """Return how far each parameter at one moves an image point at most, mm, in a corner of the format, (10,).
+
+    measured: (n, 2), image points, whose corners are taken where the format is not known.
+    """
+    reach = np.array(camera.format) / 2.0 if camera.format else np.abs(measured).max(axis=0)
+    xy = (reach * np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)]) - camera.principal_point).T
+    moved = corrections(xy)
+    moved[PRINCIPAL_DISTANCE] = xy / camera.principal_distance
+    return np.asarray(np.hypot(*moved.transpose(1, 0, 2)).max(axis=1), float)
 
 
 def _positions(found: Bundle) -> Iterator[Document]:

@@ -47,8 +47,7 @@ if TYPE_CHECKING:
 
 
 # Steps of the differences by parameter.
-STEPS = {"c": 1e-2, "x0": 1e-2, "y0": 1e-2, "k1": 1e-9, "k2": 1e-13, "k3": 1e-17, "p1": 1e-7, "p2": 1e-7}
-STEPS |= {"b1": 1e-5, "b2": 1e-5}
+STEPS = {"k1": 1e-9, "k2": 1e-13, "k3": 1e-17, "p1": 1e-7, "p2": 1e-7, "affinity": 1e-5, "shear": 1e-5}  # else 1e-2
 SUBSTITUTIONS = 12  # each leaves a hundredth of what was left, or less
 METRES, RADIANS = 0.1, 1e-5
 
@@ -88,29 +87,29 @@ def _bent(problem: BundleProblem, xy: Floats, common: Floats, camera: NDArray[np
     center = np.zeros((len(camera), 2))
     for name, value in zip(problem.common_names(), common, strict=True):
         title, _, kind = name.partition(": ")
-        if kind in {"x0", "y0"}:
-            center[camera == int(title.rpartition(" ")[2]), "xy".index(kind[0])] = value
+        if kind.startswith("principal point"):
+            center[camera == int(title.rpartition(" ")[2]), "xy".index(kind[-1])] = value
     x, y = (xy - center).T
     r2 = x**2 + y**2
     zero = np.zeros_like(x)
     focal = problem.cameras.focal[camera].astype(float)
     bend = np.zeros((len(x), 2))
     kinds = {
-        "x0": (zero - 1, zero),
-        "y0": (zero, zero - 1),
+        "principal point x": (zero - 1, zero),
+        "principal point y": (zero, zero - 1),
         "k1": (x * r2, y * r2),
         "k2": (x * r2**2, y * r2**2),
         "k3": (x * r2**3, y * r2**3),
         "p1": (r2 + 2 * x**2, 2 * x * y),
         "p2": (2 * x * y, r2 + 2 * y**2),
-        "b1": (x, zero),
-        "b2": (y, zero),
+        "affinity": (x, zero),
+        "shear": (y, zero),
     }
     for name, value in zip(problem.common_names(), common, strict=True):
         if name.startswith("camera"):
             title, _, kind = name.partition(": ")
             own = camera == int(title.rpartition(" ")[2])
-            if kind == "c":
+            if kind == "principal distance":
                 focal += value * own
             else:
                 bend += value * np.stack(kinds[kind], axis=1) * own[:, None]

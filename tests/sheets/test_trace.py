@@ -210,7 +210,7 @@ def test_a_trace_is_the_same_every_time_and_explains_its_symbols() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", ["txt", "md", "json"])
+@pytest.mark.parametrize("ending", ["txt", "md", "html", "json"])
 def test_the_preset_for_teaching_gives_a_trace_in_gon(tmp_path: Path, ending: str) -> None:
     project = write_project(tmp_path, spec(), f"extends: {ROOT / 'configs/teaching.yaml'}\n")
     file = tmp_path / f"trace.{ending}"

@@ -19,9 +19,11 @@ SECTIONS = {
     "residuals": "images",
     "image-plane": "images",
     "histogram": "images",
-    "distortion": "images",
+    "distortion": "camera images",
 }
-"""Sections of the report to which pictures belong, as ``--section`` names them; the others are of the ground."""
+"""Sections of the report to which pictures belong, as ``--section`` names them: the first that there is.
+
+The others are of the ground."""
 
 
 def pictures_of(document: Document) -> list[Picture]:

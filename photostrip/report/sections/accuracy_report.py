@@ -17,6 +17,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[Document], Iterator[Part]]], ...] = (
     ("cross-validation", "Cross-validation", points.cross_validation),
     ("control", "Control points", points.control),
     ("marks", "Marks of given points", points.marks),
+    ("camera", "Adjusted camera", network.camera),
     ("precision", "Precision", points.precision),
     ("statement", "Accuracy statement", statement.statement),
     ("project", "Project", project.project),

@@ -5,11 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from heapq import nlargest
 from itertools import groupby
+from math import floor, log10
 from operator import itemgetter
 
 from photostrip.notes import Document, counted, listed
 from photostrip.report.page.parts import Column, Facts, Part, Table, Words
-from photostrip.report.page.tables import Field, Rows, fixed, keyed, metres, short, signed, tabulated, written
+from photostrip.report.page.tables import (
+    Cell,
+    Field,
+    Rows,
+    fixed,
+    keyed,
+    metres,
+    short,
+    signed,
+    tabulated,
+    taken,
+    written,
+)
 from photostrip.report.sections.formation import GROUND_AXES, degrees
 
 ONE = {
@@ -147,19 +160,36 @@ def variance_components(document: Document) -> Iterator[Part]:
 
 
 def shared_parameters(document: Document) -> Iterator[Part]:
-    """Give calibration parameters, offsets and drifts, and what is hard to tell apart."""
+    """Give what was taken up, offsets and drifts, and what is hard to tell apart."""
     block = document.get("bundle", {})
     if not any(len(block.get(key, ())) for key in ("calibration", "corrections", "taken_up")):
         return
     if shared := tuple(taken_up(block, NAMED)):
         yield Facts(shared)
-    if len(block["calibration"]):
-        yield from _calibration(block["calibration"], pixel_sizes(document))
     if len(block["corrections"]):
         note = "added to the given positions of a strip; a drift is per unit of time"
         yield keyed(block["corrections"], "name value sigma", note)
-    if len(block["correlations"]):
-        yield keyed(block["correlations"], "first second value")
+    yield from _highly_correlated(block["correlations"], of_cameras=False)
+
+
+def camera(document: Document) -> Iterator[Part]:
+    """Give each camera as an adjustment estimated it, like the sheet of a calibration."""
+    block = document.get("bundle", {})
+    rows, pixels = block.get("calibration", ()), pixel_sizes(document)
+    names = list(rows.values("camera")) if len(rows) else []
+    for name in dict.fromkeys(names):
+        yield from _calibration(name, rows.where(camera=name), names, pixels.get(name))
+    if names:
+        yield from _highly_correlated(block["correlations"], of_cameras=True)
+        yield Words("`photostrip convert RESULT cameras.yaml` writes the adjusted cameras, for a project or a program.")
+
+
+def _highly_correlated(rows: Rows, *, of_cameras: bool) -> Iterator[Table]:
+    """Give the pairs of unknowns with a parameter of a camera, or the others."""
+    ends = zip(rows.values("first"), rows.values("second"), strict=True)
+    chosen = [n for n, pair in enumerate(ends) if any(each.startswith("camera ") for each in pair) is of_cameras]
+    if chosen:
+        yield keyed(taken(rows, chosen), "first second value", "unknowns that can hardly be told apart: above 0.95")
 
 
 def pixel_sizes(document: Document) -> dict[str, float]:
@@ -167,28 +197,43 @@ def pixel_sizes(document: Document) -> dict[str, float]:
     return {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"] if camera["pixel_size_mm"]}
 
 
-def _calibration(rows: Rows, pixels: dict[str, float]) -> Iterator[Table]:
-    """Give the parameters of cameras, lengths also in pixels, and of each camera the correlations between them."""
-    sizes = [
-        short(row["value"] / pixels[row["camera"]]) if row["camera"] in pixels and row["unit"] == "mm" else ""
-        for row in rows
+def _calibration(name: str, own: Rows, cameras: list[str], pixel: float | None) -> Iterator[Table]:
+    """Give the parameters of a camera, and the correlations between them.
+
+    cameras: of all parameters.
+    """
+    keys = f"camera parameter given adjusted value sigma unit corner_um {'pixels ' * bool(pixel)}p:1 significant"
+    adjusted, value = (
+        (Field(key, " g4", head), [_to_sigma(row.get(key), row["sigma"]) for row in own])
+        for key, head in (("adjusted", "adjusted"), ("value", "difference"))
+    )
+    corner = [row.get("corner_um") for row in own]
+    pixels = [each / (1000.0 * pixel) if pixel and each is not None else None for each in corner]
+    note = (name == cameras[-1]) * (
+        "difference: adjusted minus given; at the corner: how far it moves an image point in a corner of the photo; p: "
+        "probability of a difference this large where the given value is right; k, p, affinity, shear: of what is "
+        "added to a measured image point to make it free of distortion"
+    )
+    yield keyed(own, keys, note, adjusted=adjusted, value=value, pixels=(Field("pixels", "px 2", "", rank=1), pixels))
+    places = [n for n, each in enumerate(cameras) if each == name]
+    lines = [
+        (
+            f"{number} {row['parameter']}",
+            *(written(row["correlations"][other], " +2") for other in places[: number - 1]),
+            *[""] * (len(own) - number),
+        )
+        for number, row in enumerate(own, 1)
     ]
-    keys = f"camera parameter value sigma unit {'pixels:1 ' * bool(pixels)}p significant"
-    note = "corrections to the given calibration; p: probability of a value this large by chance"
-    yield keyed(rows, keys, note, pixels=(Field("pixels", "count", rank=1), sizes))
-    for camera in dict.fromkeys(rows.values("camera")):
-        own = [n for n, each in enumerate(rows.values("camera")) if each == camera]
-        lines = [
-            (
-                f"{number} {rows[place]['parameter']}",
-                *(written(rows[place]["correlations"][other], " +2") for other in own[: number - 1]),
-                *[""] * (len(own) - number),
-            )
-            for number, place in enumerate(own, 1)
-        ]
-        heads = Column(f"correlations, camera {camera}", left=True), *(Column(str(n)) for n in range(1, len(own)))
-        if len(own) > 1:
-            yield Table(heads, tuple(lines))
+    heads = Column(f"correlations, camera {name}", left=True), *(Column(str(n)) for n in range(1, len(own)))
+    if len(own) > 1:
+        yield Table(heads, tuple(lines))
+
+
+def _to_sigma(value: float | None, sigma: float) -> Cell:
+    """Write a value up to the second digit of its standard deviation."""
+    if not value or not sigma:
+        return Cell(short(value), value)
+    return Cell(short(value, max(1, floor(log10(abs(value))) - floor(log10(sigma)) + 2)), value)
 
 
 def taken_up(block: Document, most: int) -> Iterator[Row]:
@@ -224,7 +269,7 @@ def estimated(document: Document, most: int) -> Iterator[Row]:
         yield "estimated", found[place][0]
     if len(found) > most:
         more = counted(len(found) - most, "more camera or group of positions", "more cameras or groups of positions")
-        yield "estimated", f"{more}, less significant: --section bundle"
+        yield "estimated", f"{more}, less significant: --section camera, bundle"
     # what is common to many observations and what else could stand for it; not two parameters of cameras
     pairs = [
         f"{row['first']} with {row['second']} {row['value']:+.3f}"
@@ -251,8 +296,8 @@ def _cameras(block: Document, pixels: dict[str, float]) -> Iterator[tuple[str, f
         ]
         if pairs:
             value, first, second = max(pairs, key=lambda pair: abs(pair[0]))
-            said += f"; largest correlation {value:+.2f}, {first} with {second}"
-        yield f"camera {camera}: {said}", _largest(own, "value", "sigma")
+            said += f"; largest correlation {value:+.2f}, {first} with {second}; all: --section camera"
+        yield f"camera {camera}: added {said}", _largest(own, "value", "sigma")
 
 
 def _name(row: Document) -> str:
@@ -260,11 +305,11 @@ def _name(row: Document) -> str:
 
 
 def _parameter(row: Document, pixel: float | None) -> str:
-    """Say a parameter with its standard deviation, lengths in pixels too, and whether it could be chance."""
+    """Say a correction with its standard deviation, lengths in pixels too, and whether it could be chance."""
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     more = f", {short(row['value'] / pixel, 3)} px" if pixel and row["unit"] == "mm" else ""
     more += "" if row["significant"] else ", not significant"
-    return f"{_name(row)} {short(row['value'])}{unit} (σ {short(row['sigma'], 2)}{more})"
+    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{more})"
 
 
 def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:

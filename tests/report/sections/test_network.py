@@ -83,7 +83,7 @@ def said(document: Document, label: str) -> list[str]:
     ("wrong", "cause", "value"),
     [
         ({"east": 10.0}, "offset of the camera positions of the block", "camera positions of the block: added -9.9"),
-        ({"distance": 1.01}, "principal distance of camera film", "camera film: principal distance -1.5"),
+        ({"distance": 1.01}, "principal distance of camera film", "camera film: added -1.5"),
     ],
 )
 def test_beside_an_error_it_is_said_all_the_same(wrong: dict[str, float], cause: str, value: str) -> None:
@@ -115,7 +115,7 @@ def test_what_the_project_asks_for_is_estimated_and_not_taken_up_and_the_most_si
     ]
     *shown, more = said(document, "estimated")
     assert [each.split(":")[0] for each in shown] == [f"camera positions of strip {n}" for n in (28, 29, 30)]
-    assert more == "47 more cameras or groups of positions, less significant: --section bundle"
+    assert more == "47 more cameras or groups of positions, less significant: --section camera, bundle"
 
 
 @pytest.mark.slow
@@ -214,14 +214,19 @@ def test_the_ground_that_a_pixel_covers_is_that_of_depth_and_principal_distance(
 def test_the_estimated_camera_has_pixels_significance_and_correlations(block: Document) -> None:
     rows = {row["parameter"]: row for row in block["bundle"]["calibration"]}
     distance, k1 = rows["principal_distance"], rows["k1"]
-    said = printed(block)
-    assert f"principal distance {distance['value']:.4g} mm" in said
+    camera, said = block["cameras"][0], printed(block)
+    assert distance["given"] == camera["principal_distance_mm"]
+    assert distance["adjusted"] == pytest.approx(distance["given"] + distance["value"], abs=1e-6)
+    corner = np.hypot(*(np.array(camera["format_mm"]) / 2 + np.abs(camera["principal_point_mm"]))) * 1000.0
+    moved = abs(np.array([distance["value"] / distance["given"], k1["value"] * (corner / 1000.0) ** 2])) * corner
+    assert [distance["corner_um"], k1["corner_um"]] == pytest.approx(moved, rel=0.01)
+    assert f"added {distance['value']:.4g} mm to principal distance" in said
     assert f", {distance['value'] * 1000 / PIXEL_UM:.3g} px, not significant)" in said
     others = list(rows)
     pairs = {(a, b): rows[a]["correlations"][n] for a in rows for n, b in enumerate(others) if a != b}
     (first, second), value = max(pairs.items(), key=lambda pair: abs(pair[1]))
     assert f"largest correlation {value:+.2f}, {first} with {second}".replace("_", " ") in said
     assert "highly correlated" in said
-    section = to_text("", chosen_sections(block, names=["bundle"]), 100)
+    section = to_text("", chosen_sections(block, names=["camera"]), 100)
     (line,) = (line for line in section.splitlines() if line.startswith("4 k1"))
     assert line.split()[2:] == [f"{each:+.2f}" for each in k1["correlations"][:3]]
