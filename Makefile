@@ -34,7 +34,7 @@ lint: $(VENV)/dev.installed
 	$(BIN)/ruff format --check $(SOURCES)
 
 types: $(VENV)/dev.installed
-	$(BIN)/zmypy $(SOURCES)
+	$(BIN)/zmypy --python-executable $(BIN)/python $(SOURCES) # or it takes the packages of .venv-site
 
 lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of their own
 	rm -rf .venv-lowest

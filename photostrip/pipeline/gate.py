@@ -58,7 +58,7 @@ def require_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates) 
     for each in of_units(inputs, settings, photo) if inputs.models is None else ():
         if each.is_error and not each.accepted:
             message = f"{each.message}; nothing is adjusted, unless `accept: [{each.code}]` says that it is right"
-            raise InputError(Fault(message, code="images-refused", key=each.key, expected=each.fix))
+            raise InputError(Fault(message, code="images-refused", key=each.key, fix=each.fix))
 
 
 def of_failure(
