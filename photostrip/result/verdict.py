@@ -253,7 +253,7 @@ def _given(document: Document, role: str, *keys: str) -> Iterator[tuple[Any, ...
 
 
 def headline_rms(document: Document, role: str, part: str) -> Document:
-    """Return count, rms and largest of the differences in plan or height, metres and µm, without those that stand out."""
+    """Return count, rms and largest of the differences in plan or height, metres and µm, of what does not stand out."""
     out = set(standing_out(document, role, part))
     if not out:
         return dict(_whole(document, role)[part])
