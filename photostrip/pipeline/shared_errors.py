@@ -46,13 +46,19 @@ from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import CAUSES, Evidence
-from photostrip.plausibility.given_points import Shared, ShiftedList, StretchedHeights, find_shared, significant
+from photostrip.plausibility.given_points import (
+    CURVED_SIGMAS,
+    Shared,
+    ShiftedList,
+    StretchedHeights,
+    find_shared,
+    significant,
+)
 from photostrip.points import ControlPoints
 from photostrip.strip.fitted_strip import CheckErrors
 
 Common = StretchedHeights | ShiftedList
 FIX = "take it from the certificate"
-CURVED_SIGMAS = 2.0  # standard deviations of k1, within which it is that of the Earth's curvature
 LEAST_WRONG = 0.03  # of a principal distance, from which it is wrong and not only another one
 OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
@@ -274,9 +280,10 @@ def _lens(
         numbers: Evidence = {"radius_mm": radius}
         curved = None if earth_radius is None else _of_curvature(bundle, camera, earth_radius)
         if curved is not None and _looks_like(parameters, curved):
-            message += (
-                f". The Earth's curvature, which local coordinates taken as they are leave out, would look like k1 = "
-                f"{curved:.3g}"
+            message = (
+                "The Earth's curvature, which local coordinates taken as they are leave out, or a lens distortion that "
+                f"is not stated bends what photos of camera {name} show: {radius:.0f} mm from the principal point, "
+                f"{', '.join(parts)}; the curvature would look like k1 = {curved:.3g} mm^-2. {CONTINUED}"
             )
             fix = (
                 "are these map coordinates: name their crs, or set `processing.earth_curvature: model`; is the plane a "
