@@ -1,4 +1,4 @@
-"""Pages of four projects in Chromium, where it is installed: nothing fails or is asked for, tables sort and filter.
+"""Pages of four projects and a batch in Chromium, where it is installed: nothing fails, tables sort and filter.
 
 Chromium is driven over a pipe by its own protocol, with no package but Python.
 """
@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.pipeline.inputs import Settings, Strip
-from photostrip.report.html import to_html
+from photostrip.report.html import batch_html, to_html
 from photostrip.simulation import Flight, Models, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
+from tests.report.test_html import outcome
 from tests.reports import saved
 from tests.results import by_rows, case, in_tables, solved, spec
 from tests.simulated import inputs_of
@@ -62,6 +63,16 @@ FILTERED = """
   field.value = "";
   field.dispatchEvent(new Event("input"));
   return { wanted, left, rows: rows.length, all: rows.filter((row) => row.checkVisibility()).length };
+})
+"""
+COVERED = """
+[...document.querySelectorAll("figure svg")].flatMap((svg) => {
+  const all = svg.getBoundingClientRect();
+  const texts = [...svg.querySelectorAll("text")].map((text) => [text.textContent, text.getBoundingClientRect()]);
+  const over = ([, a], [, b]) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
+    && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3;
+  return texts.filter((one, n) => one[1].left < all.left - 1 || one[1].right > all.right + 1
+    || texts.slice(0, n).some((other) => over(one, other))).map(([words]) => words);
 })
 """
 
@@ -140,10 +151,9 @@ def opened(program: str, folder: Path) -> Iterator[Browser]:
 def document(kind: str) -> dict[str, Any]:
     """Give the result of a project of a kind."""
     if kind == "failed run":
-        found = by_rows(saved())
-        found["control"] = [row | {"id": f"{row['id']}.{n}"} for n in range(3) for row in found["control"]]
-        shown: dict[str, Any] = in_tables(found)
-        return shown
+        result = by_rows(saved())
+        result["control"] = [row | {"id": f"{row['id']}.{n}"} for n in range(3) for row in result["control"]]
+        return dict(in_tables(result))
     if kind == "strip":  # long enough for a table that is filtered
         run = solved(inputs_of(simulate(Spec(flight=Flight(photos=24)))))
     elif kind == "models":
@@ -162,10 +172,17 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield found
 
 
-@pytest.fixture(scope="module", params=["failed run", "strip", "single photos", "models"])
+def html(kind: str) -> str:
+    if kind != "batch":
+        return to_html(document(kind))
+    side_by_side = ([[[15.0, 50.0 + n / 100], [15.3, 50.0 + n / 100]]] for n in range(200))
+    return batch_html([outcome(f"strip-{n}", track=track) for n, track in enumerate(side_by_side)], "1")
+
+
+@pytest.fixture(scope="module", params=["failed run", "strip", "single photos", "models", "batch"])
 def page(request: pytest.FixtureRequest, browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Browser:
     file = tmp_path_factory.mktemp("page") / "report.html"
-    file.write_text(to_html(document(request.param)), encoding="utf-8")
+    file.write_text(html(request.param), encoding="utf-8")
     browser.open(file)
     return browser
 
@@ -179,7 +196,7 @@ def test_nothing_fails_and_nothing_is_asked_for(page: Browser) -> None:
 
 def test_tables_sort_and_come_back(page: Browser) -> None:
     found = page.ask(SORTED)
-    assert len(found) > 20
+    assert len(found) > 8
     for each in nonempty(found):
         assert each["same"]
         assert each["state"] == "ascending"
@@ -206,6 +223,12 @@ def test_other_scripts_do_not_run(page: Browser) -> None:
 def test_the_page_is_not_wider_than_the_screen(page: Browser, width: int) -> None:
     page.call("Emulation.setDeviceMetricsOverride", width=width, height=800, deviceScaleFactor=1, mobile=width < 500)
     assert page.ask("document.documentElement.scrollWidth") <= width
+
+
+def test_words_in_pictures_cover_no_others_and_are_whole(page: Browser) -> None:
+    page.call("Emulation.setDeviceMetricsOverride", width=1120, height=800, deviceScaleFactor=1, mobile=False)
+    assert page.ask(COVERED) == []
+    assert page.ask('document.querySelectorAll("svg .id").length') > 8
 
 
 def test_dark_readers_get_a_dark_page(page: Browser) -> None:

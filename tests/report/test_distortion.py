@@ -25,11 +25,7 @@ SPEC: dict[str, Any] = {
 @pytest.mark.parametrize(("stated", "direction"), [(0.0, "image_to_ideal"), (-K1 / 2, "ideal_to_image")])
 def test_the_adjusted_curve_is_that_of_the_lens(stated: float, direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Panel] = []
-    monkeypatch.setattr(
-        residuals,
-        "chart",
-        lambda name, words, panels, **look: drawn.extend(panels) or chart(name, words, panels, **look),
-    )
+    monkeypatch.setattr(residuals, "chart", lambda *of, **look: drawn.extend(of[2]) or chart(*of, **look))
     simulation = photostrip.simulate(SPEC, seed=2)
     lens = {"model": "brown", "k": [stated, 0, 0], "direction": direction}
     result = simulation.project.overridden(

@@ -15,8 +15,8 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.pipeline.inputs import Settings
-from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel, chart
-from photostrip.report.pictures.places import plan_of, rays_of
+from photostrip.report.pictures.chart import MOST_DOTS, Axis, Map, Marks, Panel, Segments, chart, rows_of
+from photostrip.report.pictures.places import plan_of, rays_of, shortened
 from photostrip.report.pictures.plan import footprint_pictures, footprints
 from photostrip.report.pictures.result import pictures_of
 from photostrip.result.numbers import MATRIX
@@ -50,9 +50,6 @@ def drawn(document: Document, name: str) -> str:
 def hints(svg: str) -> list[str]:
     root = ET.fromstring(svg)  # noqa: S314 (we wrote it)
     return [element.text or "" for element in root.iter(f"{SVG}title")][1:]
-
-
-# ------------------------------------------------------------------------------------------------- places of a result
 
 
 @pytest.mark.parametrize("frame", sorted(FRAMES))
@@ -144,9 +141,6 @@ def test_parallaxes_have_the_mean_of_their_zone_and_ties_count_the_points_in_com
     assert counts == expected
 
 
-# ---------------------------------------------------------------------------------------------------------- soundness
-
-
 def test_every_picture_is_sound_and_stays_inside_and_as_a_file_needs_no_page() -> None:
     for frame, strips in (("projected", 1), ("north first", 2)):
         for picture in pictures_of(case(frame, strips).document):
@@ -205,6 +199,21 @@ def test_many_points_are_thinned_which_the_caption_says_and_panels_without_any_d
     assert "</svg>" in chart("empty", ("", "", ""), [Panel([nothing]), Panel([nothing], log=True), Map([nothing])]).svg
 
 
+def test_long_maps_are_cut_into_rows_in_which_nothing_is_torn_and_long_names_are_shortened() -> None:
+    at = np.column_stack([np.linspace(0.0, 1000.0, 100), np.tile([0.0, 10.0], 50)])
+    rows = rows_of(at)
+    assert (rows > 3, rows_of(at * (0.1, 1.0))) == (True, 1)
+    picture = chart("long", ("", "", ""), [Map([Segments(at, at + np.array([5.0, 0.0]))], rows=rows)])
+    ends = np.array(re.findall(r'd="M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)"', picture.svg), float)
+    assert ends[:, 2] - ends[:, 0] == pytest.approx(4.1 * rows, rel=0.03)  # 5 of 1000 m, 912 wide
+    assert (ends[:, 3] == ends[:, 1]).all()
+    assert len(set(ends[:, 1])) == 2 * rows
+    named, words = shortened(["DJI_0007.JPG", "DJI_0012.JPG"])
+    assert list(named.values()) == ["07", "12"]
+    assert "“DJI_00” before and “.JPG” after" in words
+    assert shortened(["1001", "1002"]) == ({"1001": "1001", "1002": "1002"}, "")
+
+
 def test_ticks_are_round_and_inside() -> None:
     axis = Axis(-0.37, 1.21, 300.0, 20.0)
     assert [value for value, _ in axis.ticks()] == pytest.approx([0.0, 0.5, 1.0])
@@ -215,8 +224,6 @@ def test_ticks_are_round_and_inside() -> None:
     assert shown[0] == (1.0, "photo 0")
     assert len(shown) < 6
 
-
-# -------------------------------------------------------------------------------------------------------- footprints
 
 SIDE = 2300.0  # of a photo on the ground, m
 DISTANCE = 153.0
@@ -324,9 +331,6 @@ def test_the_overlap_is_counted_within_the_outlines() -> None:
     (picture,) = footprint_pictures(plan_of(in_tables(made)))
     assert ">2 photos<" in picture.svg
     assert ">1 photo<" not in picture.svg
-
-
-# -------------------------------------------------------------------------------------------------------------- files
 
 
 @pytest.mark.slow

@@ -50,9 +50,6 @@ def tables(found: Section) -> list[Table]:
     return [part for part in found.parts if isinstance(part, Table)]
 
 
-# ---------------------------------------------------------------------------------------------------- snapshots
-
-
 @pytest.mark.parametrize("name", SNAPSHOTS)
 def test_the_report_looks_as_it_did(name: str) -> None:
     """Renew with ``python -m tests.reports`` and review the difference."""
@@ -73,9 +70,6 @@ def paths(value: object, path: str = "") -> Iterator[str]:
 def test_the_saved_result_has_the_keys_of_a_fresh_one() -> None:
     """If not, renew with ``python -m tests.reports result``."""
     assert set(paths(saved())) == set(paths(fresh()))
-
-
-# ------------------------------------------------------------------------------------------------ from the file
 
 
 @pytest.mark.parametrize("key", sorted(saved().keys() - {"polynomial_terms", "polynomial_evidence"}))
@@ -101,9 +95,6 @@ def test_the_verdict_is_said_first_and_last_with_what_to_look_at(count: int, *, 
     assert lines[3] == lines[-1] == (counted if count else "GOOD: nothing calls for a second look.")
     assert lines[4 : 5 + count] == ["Rms 0.1 m.", *(f"{n + 1}. thing {n}" for n in range(count))]
     assert lines.count("Rms 0.1 m.") == 1
-
-
-# --------------------------------------------------------------------------------------------- numbers and units
 
 
 def test_every_number_of_a_table_has_its_unit() -> None:
@@ -186,9 +177,6 @@ def test_what_other_projects_have_is_said(title: str, document: Document, texts:
     said = words(section(document, title))
     assert [text for text in texts if text not in said] == []
     assert "given, but not measured" not in said
-
-
-# ------------------------------------------------------------------------------------------------------ Markdown
 
 
 def test_markdown_escapes_ids() -> None:

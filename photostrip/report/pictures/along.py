@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.notes import Document, counted
 from photostrip.report.page.tables import short
 from photostrip.report.pictures.chart import (
+    MOST_NAMED,
     Areas,
     Floats,
     Layer,
@@ -23,7 +24,7 @@ from photostrip.report.pictures.chart import (
     nice,
     span,
 )
-from photostrip.report.pictures.places import Course, Plan, numbers
+from photostrip.report.pictures.places import Course, Plan, numbers, shortened
 from photostrip.report.pictures.plan import ROLES
 from photostrip.report.pictures.svg import Picture
 
@@ -175,6 +176,7 @@ def precision_pictures(document: Document) -> list[Picture]:
     return [chart("precision", words, panels, columns=min(2, len(shown)), height=210.0 if len(shown) == 1 else 140.0)]
 
 
+WORST_NAMED = 15  # check points that have their names where they crowd
 LIMITS = {"plan": 2.448, "height": 1.960}  # 95 % of a length in plan by its covariance, and of a height
 
 
@@ -201,8 +203,9 @@ def check_pictures(document: Document) -> list[Picture]:
         looks = (~outside, "check", "square", "inside"), (outside, "failed open", "diamond", "outside")
         layers += [Marks(at[own], kind, shape, hints[own].tolist(), words, 4.0) for own, kind, shape, words in looks]
         known = [n for n in worst if np.isfinite(size[n])]
-        layers.append(Names(at[known], ids[known].tolist()))
-        panels.append(Panel(layers, part, ("check points in their order", "z"), x=ends, names=[""] * len(rows)))
+        named = known[: max(int(outside.sum()), WORST_NAMED if len(rows) > MOST_NAMED else len(rows))]
+        layers.append(Names(at[named], ids[named].tolist()))
+        panels.append(Panel(layers, part, ("check points in their order", "d/σ"), x=ends, names=[""] * len(rows)))
     caption = (
         "Differences at check points over their standard deviations: in plan the length in the metric of the "
         "covariance, in height with its sign. 95 % lie inside the band when these standard deviations are right."
@@ -241,6 +244,8 @@ def parallax_pictures(document: Document) -> list[Picture]:
     limit = 1.05 * nice(max(float(np.quantile(tested, SHARE_ON_AXIS)), 1e-6))
     borders = np.array([(n + 0.5, limit) for n in range(1, len(pairs)) if strips[n] != strips[n - 1]]).reshape(-1, 2)
     at = np.column_stack([number, size])
+    called, left_out = shortened([photo["id"] for photo in document["photos"]])
+    lefts = [called.get(pair["left"], pair["left"]) for pair in pairs]
     panels = []
     for zone, where in ZONES.items():
         own, out = np.flatnonzero((zones == zone) & used), np.flatnonzero((zones == zone) & ~used)
@@ -254,8 +259,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
             means = np.bincount(of_pair, size[own]) / np.bincount(of_pair)
             layers.append(Line(np.column_stack([there, means]), "c1 thin", "mean of the pair"))
             scatter = float(np.std(size[own], ddof=min(1, len(own) - 1)))
-            title += f": {size[own].mean():+.1f} ± {scatter / len(own) ** 0.5:.1f} µm, scatter {scatter:.1f}"
-        lefts = [pair["left"] for pair in pairs]
+            title += f": {size[own].mean():+z.1f} ± {scatter / len(own) ** 0.5:.1f} µm, scatter {scatter:.1f}"
         panels.append(Panel(layers, title, ("left photo of the pair", "µm"), y=(-limit, limit), names=lefts))
     caption = (
         "Residual y parallaxes in the six standard zones, laid out as in the left photo, pair after pair. Above each "
@@ -267,6 +271,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
         caption += f" At the ends of the axis {counted(beyond, 'parallax', 'parallaxes')} beyond it."
     if len(borders):
         caption += " Upright lines part the strips."
+    caption += left_out
     worst = int(np.argmax(np.where(used, np.abs(size), -1.0)))
     words = "y parallaxes by standard zone", caption, f"{counted(len(pairs), 'pair')}; the largest is {hints[worst]}."
     return [chart("parallaxes", words, panels, columns=2, height=130.0)]

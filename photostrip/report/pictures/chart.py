@@ -27,8 +27,12 @@ TICKS = 6  # about so many on an axis
 LETTER, LETTER_HEIGHT = 7.2, 12.0  # at most so large
 MOST_HINTS = 1500  # more marks have none
 MOST_DOTS = 10_000  # more are thinned, and the caption says so
-MOST_TRIED = 400  # names for which room is looked for
-CELL = 4.0  # of the picture, that a name or mark takes
+CELL = 4.0  # of the picture, that a name, a mark or a line takes
+MOST_NAMED, MOST_TRIED = 60, 400  # names that stand wherever they can; others for which much room is looked for
+SPARE = 12.0  # of the picture, around names that need not stand
+STEPS = 60  # along a line that names keep clear of
+LONGEST_ROW = 15.0  # length of a map over its height, from about which it is cut into rows
+MOST_HIGH = 1.1  # rows of a map together, over their length
 FLAT = 1e-12  # a range without extent
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 
@@ -85,14 +89,25 @@ class Axis(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """A panel on the picture."""
+    """A panel on the picture; of a long map the first of its rows, which go on below each other."""
 
     x: Axis
     y: Axis
+    rows: int = 1
+    start: float = 0.0  # of the first row, in coordinates of the map
+    length: float = 1.0  # of each row
+    down: float = 0.0  # from row to row, on the picture
 
-    def places(self, at: Floats) -> Floats:
+    def row(self, at: Floats) -> NDArray[np.float64]:
+        """Return in which row each place stands."""
+        along = (np.nan_to_num(np.asarray(at, np.float64).reshape(-1, 2)[:, 0]) - self.start) / self.length
+        return np.clip(np.floor(along), 0.0, self.rows - 1.0)
+
+    def places(self, at: Floats, about: Floats | None = None) -> Floats:
+        """Return places on the picture; what belongs together stands in the row of the places it is about."""
         at = np.asarray(at, np.float64).reshape(-1, 2)
-        return np.column_stack([self.x(at[:, 0]), self.y(at[:, 1])])
+        row = self.row(at if about is None else about)
+        return np.column_stack([self.x(at[:, 0] - row * self.length), self.y(at[:, 1]) + row * self.down])
 
 
 # ------------------------------------------------------------------------------------------------------------- layers
@@ -131,8 +146,12 @@ class Line:
 
     def draw(self, frame: Frame) -> Iterator[str]:
         known = self.at[np.isfinite(self.at).all(axis=1)]
-        if len(known):
-            yield svg.path(frame.places(known).tolist(), f"line {self.kind}")
+        for part in np.split(frame.places(known), np.flatnonzero(np.diff(frame.row(known))) + 1):
+            if len(part):
+                yield svg.path(part.tolist(), f"line {self.kind}")
+
+    def course(self, frame: Frame) -> Floats:
+        return between(*(frame.places(ends) for ends in (self.at[:-1], self.at[1:])))
 
 
 @dataclass(frozen=True)
@@ -150,10 +169,19 @@ class Segments:
     def at(self) -> Floats:
         return np.concatenate([np.asarray(self.start).reshape(-1, 2), np.asarray(self.end).reshape(-1, 2)])
 
+    def ends(self, frame: Frame) -> tuple[Floats, Floats, Floats]:
+        """Return on the picture where each starts, towards where it bows, and where it ends."""
+        start, end = np.split(frame.places(self.at, np.tile(np.asarray(self.start).reshape(-1, 2), (2, 1))), 2)
+        return start, (start + end) / 2 + self.bow * (end - start)[:, ::-1] * (1.0, -1.0), end
+
+    def course(self, frame: Frame) -> Floats:
+        start, over, end = self.ends(frame)
+        middle = (start + 2 * over + end) / 4
+        return np.concatenate([between(start, middle), between(middle, end)])
+
     def draw(self, frame: Frame) -> Iterator[str]:
-        start, end = np.split(frame.places(self.at), 2)
+        start, over, end = self.ends(frame)
         way = end - start
-        over = (start + end) / 2 + self.bow * way[:, ::-1] * (1.0, -1.0)
         rows = np.concatenate([start, over, end] if self.bow else [start, end], axis=1)
         steps = "M{} {}Q{} {} {} {}" if self.bow else "M{} {}L{} {}"
         known = np.flatnonzero(np.isfinite(way).all(axis=1)).tolist()
@@ -177,8 +205,16 @@ class Areas:
     def at(self) -> Floats:
         return np.concatenate([np.zeros((0, 2)), *self.outlines])
 
+    def course(self, frame: Frame) -> Floats:
+        """Return where the borders run, of outlines that are not filled."""
+        if "open" not in self.kind or not self.outlines:
+            return np.zeros((0, 2))
+        corners = [frame.places(outline, np.tile(outline.mean(axis=0), (len(outline), 1))) for outline in self.outlines]
+        return np.concatenate([between(each, np.roll(each, 1, axis=0)) for each in corners])
+
     def draw(self, frame: Frame) -> Iterator[str]:
-        corners = [frame.places(outline).tolist() for outline in self.outlines]
+        about = (np.tile(outline.mean(axis=0), (len(outline), 1)) for outline in self.outlines)
+        corners = [frame.places(*each).tolist() for each in zip(self.outlines, about, strict=True)]
         if not self.hints:
             yield svg.element("path", d="".join(f"M{svg.joined(each)}z" for each in corners), kind=self.kind)
             return
@@ -196,34 +232,79 @@ def ellipse(a: float, b: float, angle: float) -> Floats:
     return np.column_stack([x * cosine - y * sine, x * sine + y * cosine])
 
 
+def between(start: Floats, end: Floats) -> Floats:
+    """Return places along lines."""
+    share = np.linspace(0.0, 1.0, STEPS)[:, None, None]
+    return np.asarray((start + share * (end - start)).reshape(-1, 2))
+
+
 @dataclass(frozen=True)
 class Names:
-    """Names beside their places where they cover no other name and no mark, the first ones first."""
+    """Names beside their places that cover no other name, and marks and lines only where there is no other way.
+
+    The first ones stand wherever they can; the others only where there is much room, so that a crowd stays readable:
+    of many all, unless it is said how many are first.
+    """
 
     at: Floats
     names: Sequence[str]
-    beside: bool = True
+    beside: bool = True  # in the middle of what they name otherwise
+    first: int | None = None
     words: str = ""
 
-    def draw(self, frame: Frame) -> Iterator[str]:
+    def draw(self, frame: Frame, others: Iterable[Layer]) -> Iterator[str]:
         places = frame.places(self.at)
-        top, bottom = sorted((frame.y.start, frame.y.end))
-        taken = np.zeros((int(bottom / CELL) + 8, int(WIDTH / CELL) + 1), bool)
+        top, bottom = min(frame.y.start, frame.y.end), max(frame.y.start, frame.y.end) + (frame.rows - 1) * frame.down
+        taken, drawn = (np.zeros((int(bottom / CELL) + 8, int(WIDTH / CELL) + 2), bool) for _ in range(2))
+        for layer in others:
+            if isinstance(layer, Marks):
+                _take(drawn, frame.places(layer.at), layer.size)
+            elif not isinstance(layer, Names):
+                _take(drawn, layer.course(frame))
+        first = self.first or len(places) * (self.first is None and len(places) <= MOST_NAMED)
         if self.beside:
-            column, row = (places / CELL).astype(int).T
-            taken[row, column] = True
-        for name, (x, y) in list(zip(self.names, places.tolist(), strict=True))[:MOST_TRIED]:
-            wide = 0.9 * LETTER * len(name)
-            around = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
-            for left, base in around if self.beside else ((x - wide / 2, y + 4.0),):
-                if left < CELL or left + wide > WIDTH - CELL or not top - 4.0 < base < bottom + 16.0:
-                    continue
-                rows = slice(int((base - LETTER_HEIGHT + 2.0) / CELL), int(base / CELL) + 1)
-                box = taken[rows, int((left - 2.0) / CELL) : int((left + wide + 2.0) / CELL) + 1]
-                if not box.any():
-                    box[:] = True
-                    yield svg.text((left, base), name, "id")
-                    break
+            _take(taken, places[:first], CELL)
+        rest = range(first, len(places))
+        for n in (*range(min(first, len(places))), *rest[:: len(rest) // MOST_TRIED + 1]):
+            spare = SPARE if n >= first else 0.0
+            free: list[tuple[int, int, float, float, tuple[slice, slice]]] = []
+            wide = LETTER * len(self.names[n])
+            for left, base in self._around(places[n], wide):
+                inside = frame.x.start - CELL < left < frame.x.end + RIGHT - wide and top - 8.0 < base < bottom + 16.0
+                text = _box(left, base, wide, 0.0)
+                if inside and not taken[_box(left, base, wide, spare)].any():
+                    free.append((int(drawn[text].sum()), len(free), left, base, text))
+            if free and (spare == 0.0 or min(free)[0] == 0):
+                *_, left, base, text = min(free)
+                taken[text] = True
+                yield svg.text((left, base), self.names[n], "id")
+
+    def _around(self, place: Floats, wide: float) -> list[svg.Point]:
+        """Return where the text of a name may start."""
+        x, y = place.tolist()
+        if not self.beside:
+            steps = sorted(((dx, dy) for dx in (-12, 0, 12) for dy in (-10, 0, 10)), key=np.hypot.reduce)
+            return [(x - wide / 2 + dx, y + 4.0 + dy) for dx, dy in steps]
+        sides = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
+        return [*sides, *((left, base) for left in (x + 5.0, x - 5.0 - wide) for base in (y - 5.0, y + 13.0))]
+
+
+def _take(cells: NDArray[np.bool_], places: Floats, size: float = 0.0) -> None:
+    """Say that places, and what is near to them, are taken."""
+    known = places[np.isfinite(places).all(axis=1)]
+    near = {-size, 0.0, size}
+    for x, y in ((known[:, 0] + dx, known[:, 1] + dy) for dx in near for dy in near):
+        row, column = (
+            np.clip(at / CELL, 0, limit - 1).astype(int) for at, limit in zip((y, x), cells.shape, strict=True)
+        )
+        cells[row, column] = True
+
+
+def _box(left: float, base: float, wide: float, spare: float) -> tuple[slice, slice]:
+    """Return the cells that a text takes."""
+    ends = (base - LETTER_HEIGHT + 2.0 - spare, base + spare), (left - 2.0 - spare, left + wide + 2.0 + spare)
+    rows, columns = (slice(max(0, int(low / CELL)), max(0, int(high / CELL) + 1)) for low, high in ends)
+    return rows, columns
 
 
 Layer = Marks | Line | Segments | Areas | Names
@@ -269,7 +350,7 @@ class Panel:
 
     def surround(self, frame: Frame) -> Iterator[str]:
         """Draw grid lines, numbers and names of the axes."""
-        (x, y), bottom = frame, max(frame.y.start, frame.y.end)
+        (x, y, *_), bottom = frame, max(frame.y.start, frame.y.end)
         top = min(frame.y.start, frame.y.end)
         for value, words in x.ticks():
             at = float(x(value))
@@ -282,7 +363,7 @@ class Panel:
             yield svg.text((x.start - 8.0, at + 4.0), words, "tick", "end")
         yield svg.text(((x.start + x.end) / 2, bottom + 38.0), self.labels[0], "axis", "middle")
         yield svg.text((x.start - 8.0, top - 12.0), self.labels[1], "axis", "end")
-        yield svg.text((x.start + 4.0, top - 12.0), self.title, "title")
+        yield svg.text((x.start + 4.0, top - 12.0), fitted(self.title, x.end - x.start + RIGHT), "title")
 
 
 @dataclass(frozen=True)
@@ -292,32 +373,45 @@ class Map:
     layers: Sequence[Layer]
     title: str = ""
     extent: tuple[Range, Range] | None = None  # along x and y, in place of all that the layers hold
+    rows: int = 1  # below each other, into which a long map is cut
 
-    def ranges(self) -> tuple[Range, Range]:
+    def first_row(self) -> tuple[Floats, Floats, float]:
+        """Return the lower and the upper end of what the first row shows, and the room at its sides."""
         if self.extent:
-            return self.extent
+            low, high = np.array(self.extent).T
+            return low, high, 0.0
         at = np.concatenate([np.zeros((0, 2)), *(layer.at for layer in self.layers)])
         at = at[np.isfinite(at).all(axis=1)]
         low, high = (at.min(axis=0), at.max(axis=0)) if len(at) else (np.zeros(2), np.ones(2))
+        high[0] = low[0] + (high[0] - low[0]) / self.rows
         room = max(ROOM * float((high - low).max()), 1e-6)
-        (a, b), (c, d) = (low - room).tolist(), (high + room).tolist()
-        return (a, c), (b, d)
+        return low - room, high + room, room
 
     def height(self, width: float) -> float:
-        """Return the height of the map on a picture, at most ``HIGHEST``."""
-        x, y = self.ranges()
-        return min(HIGHEST, width * (y[1] - y[0]) / (x[1] - x[0]))
+        """Return the height of the map on a picture, of one in one row at most ``HIGHEST``."""
+        low, high, _ = self.first_row()
+        height = width * (high[1] - low[1]) / (high[0] - low[0])
+        return float(min(HIGHEST, height) if self.rows == 1 else self.rows * height)
 
     def framed(self, corner: svg.Point, width: float, height: float) -> Frame:
-        x, y = self.ranges()
-        scale = min(width / (x[1] - x[0]), height / (y[1] - y[0]))
-        wide, high = width / scale - (x[1] - x[0]), height / scale - (y[1] - y[0])
-        x, y = (x[0] - wide / 2, x[1] + wide / 2), (y[0] - high / 2, y[1] + high / 2)
+        low, high, room = self.first_row()
+        down = height / self.rows
+        scale = min(width / (high[0] - low[0]), down / (high[1] - low[1]))
+        spare = (np.array([width, down]) / scale - (high - low)) / 2
+        (a, c), (b, d) = (low - spare).tolist(), (high + spare).tolist()
         left, top = corner
-        return Frame(Axis(*x, left, left + width), Axis(*y, top + height, top))
+        x, y = Axis(a, b, left, left + width), Axis(c, d, top + down, top)
+        return Frame(x, y, self.rows, float(low[0]) + room, float(high[0] - low[0]) - 2.0 * room or 1.0, down)
 
     def surround(self, frame: Frame) -> Iterator[str]:
-        yield svg.text((frame.x.start + 2.0, frame.y.end - 5.0), self.title, "tick")
+        words = fitted(self.title, frame.x.end - frame.x.start)
+        yield svg.text((frame.x.start + 2.0, frame.y.end - 5.0), words, "tick")
+
+
+def fitted(words: str, room: float) -> str:
+    """Return words that fit, without their middle where they are too long."""
+    most = int(room / (LETTER + 1.0))
+    return words if len(words) <= most else f"{words[: most // 2 - 1]}…{words[len(words) - most // 2 :]}"
 
 
 class Bar(NamedTuple):
@@ -326,6 +420,14 @@ class Bar(NamedTuple):
     length: float  # in coordinates of the first map
     words: str
     kind: str = "ink"
+
+
+def rows_of(at: Floats) -> int:
+    """Return into how many rows a map is cut: into one unless it is much longer than high."""
+    wide, high = np.ptp(at[np.isfinite(at).all(axis=1)], axis=0).tolist() if len(at) else (1.0, 1.0)
+    ratio = min(wide / max(high, FLAT), 1000.0)
+    most = ratio * (math.sqrt(ROOM**2 + MOST_HIGH / ratio) - ROOM)  # n * (n / ratio + 2 * ROOM) = MOST_HIGH
+    return max(1, int(min(ratio / LONGEST_ROW, most)))
 
 
 def ground_bar(extent: float) -> Bar:
@@ -368,7 +470,8 @@ def chart(
             frame = panel.framed((left + n * (width + gap), top), width, high)
             frames.append(frame)
             drawn += panel.surround(frame)
-            drawn += [each for layer in panel.layers for each in layer.draw(frame)]
+            for layer in panel.layers:
+                drawn += layer.draw(frame, panel.layers) if isinstance(layer, Names) else layer.draw(frame)
         top += high + below
     if north is not None:
         drawn += _north_arrow(north)
@@ -379,8 +482,11 @@ def chart(
         for layer in panel.layers
         if isinstance(layer, Marks) and layer.every > 1
     ]
-    extent = WIDTH, top + (26.0 if bars else 0.0)
-    return svg.picture(name, extent, drawn, title, caption + "".join(dict.fromkeys(thinned)), description)
+    cut = [
+        f" Cut into {panel.rows} rows, from the top." for panel in panels if isinstance(panel, Map) and panel.rows > 1
+    ]
+    extent = WIDTH, top + (26.0 if bars else 0.0 if maps else -24.0)
+    return svg.picture(name, extent, drawn, title, caption + "".join(dict.fromkeys(cut + thinned)), description)
 
 
 def _legend(layers: Iterable[Layer], heading: str) -> tuple[list[str], float]:

@@ -59,7 +59,7 @@ def _map(number: int, projects: Sequence[Document]) -> Picture:
             hints = [f"{projects[n]['project']}: {status}" for n in own]
             layers.append(Segments(ends[:, 0], ends[:, 1], colour))
             layers.append(Marks(first, colour, shape, hints, status))
-    layers.append(Names(np.array([each["track"][0][0] for each in projects]) * metres, names))
+    layers.append(Names(np.array([each["track"][0][0] for each in projects]) * metres, names, first=len(names)))
     places = ", ".join(f"{name} ({each['status']})" for name, each in list(zip(names, projects, strict=True))[:NAMED])
     words = (
         f"{counted(len(projects), 'project')} on a body of {projects[0]['body'] / 1000:.0f} km radius",

@@ -6,22 +6,39 @@ The plan is turned so that the first strip runs to the right from its first phot
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from os.path import commonprefix
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.notes import Document
+from photostrip.report.pictures.chart import rows_of
 from photostrip.report.sections.project import cameras_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
+SHORT = 8  # letters that a name may have
 MATRIX = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))  # of a rotation, by rows
+
+
+def shortened(names: Sequence[str]) -> tuple[dict[str, str], str]:
+    """Return long names of photos without what all of them begin and end with, and a sentence that says so."""
+    ending = re.fullmatch(r".*?(\.\w+)?", names[0] if names else "")
+    end = (ending and ending[1]) or ""
+    end = end if all(name.endswith(end) for name in names) else ""
+    start = commonprefix([name.removesuffix(end)[:-1] for name in names])  # noqa: RUF071 (names, not paths)
+    if max(map(len, names), default=0) <= SHORT or not start + end:
+        return dict(zip(names, names, strict=True)), ""
+    parts = [f"“{start}” before"] * bool(start) + [f"“{end}” after"] * bool(end)
+    short = {name: name.removesuffix(end)[len(start) :] for name in names}
+    return short, f" Photos stand without {' and '.join(parts)} their names."
 
 
 def numbers(rows: Sequence[Document], *keys: str) -> Floats:
@@ -112,6 +129,16 @@ class Plan:
     def rows(self, ids: Iterable[str]) -> NDArray[np.intp]:
         """Return the numbers of points; -1 for one that the result does not have."""
         return np.array([self.row.get(name, -1) for name in ids], np.intp)
+
+    @cached_property
+    def everything(self) -> Floats:
+        """Return points and known perspective centres, in plan."""
+        return np.concatenate([self.points[:, :2], self.photos[np.isfinite(self.photos).all(axis=1), :2]])
+
+    @cached_property
+    def map_rows(self) -> int:
+        """Return into how many rows a map of all is cut."""
+        return rows_of(self.everything)
 
     def course(self, strip: str) -> Course:
         return course_of(self.photos[self.strips[strip]])

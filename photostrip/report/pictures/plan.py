@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from itertools import combinations, pairwise
+from operator import itemgetter
 
 import numpy as np
 
 from photostrip.notes import Document, counted, listed
 from photostrip.report.page.tables import short
 from photostrip.report.pictures.chart import (
+    MOST_NAMED,
     Areas,
     Bar,
     Floats,
@@ -32,12 +34,14 @@ from photostrip.report.pictures.chart import (
     length,
     nice,
 )
-from photostrip.report.pictures.places import Plan, format_of, grouped, numbers, rays_of
+from photostrip.report.pictures.places import Plan, format_of, grouped, numbers, rays_of, shortened
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
 # in shares of the plan's extent: the vector or half axis in the middle, and the longest, at which others are cut off
 TYPICAL, LONGEST = 0.02, 0.12
+MANY = 100  # photos, from which their marks are small
+WORST_NAMED = 25  # points on a map of precision
 MOST_ELLIPSES = 90  # more of them are a grey cloud: new points go without
 ROLES = {
     "new": ("new point", "dot", 3.0),
@@ -50,12 +54,11 @@ CLASSES = 6
 def plan_picture(plan: Plan) -> Picture:
     document = plan.document
     at, moved = plan.points[:, :2], plan.shift[:, :2]
-    everything = np.concatenate([at, plan.photos[np.isfinite(plan.photos).all(axis=1), :2]])
-    extent = max(float(np.ptp(everything, axis=0).max()), 1.0) if len(everything) else 1.0
+    extent = max(_extent(plan, plan.everything), 1.0)
     sizes = np.concatenate([np.linalg.norm(moved, axis=1), plan.ellipse[:, 0]])
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
     typical = max(float(np.median(sizes)), 1e-9) if len(sizes) else 1e-9
-    factor, most = float(f"{TYPICAL * extent / typical:.2g}"), LONGEST * extent
+    factor, most = float(f"{TYPICAL * extent / typical:.2g}"), LONGEST * extent / min(plan.map_rows, 2)
     drawn = factor * moved
     drawn *= np.minimum(1.0, most / np.maximum(np.linalg.norm(drawn, axis=1, keepdims=True), 1e-9))
     axes = plan.ellipse * [factor, factor, 1.0]
@@ -63,7 +66,9 @@ def plan_picture(plan: Plan) -> Picture:
     cut = factor * float(np.max(sizes, initial=0.0)) > most
     known = np.isfinite(plan.ellipse).all(axis=1)
     crowded = int(known.sum()) > MOST_ELLIPSES
-    layers: list[Layer] = [Line(plan.photos[rows, :2], "photo thin dashed") for rows in plan.strips.values() if rows]
+    layers: list[Layer] = [
+        Line(plan.photos[rows, :2], "photo thin dashed") for strip, rows in plan.strips.items() if strip and rows
+    ]
     shown = np.flatnonzero(known & ~(crowded & (plan.role == "new")))
     layers.append(Areas([at[n] + ellipse(*axes[n]) for n in shown], "open ellipse"))
     for role, (words, shape, size) in ROLES.items():
@@ -73,21 +78,25 @@ def plan_picture(plan: Plan) -> Picture:
         layers.append(Marks(at[rows], role, shape, hints, words, size))
     centres = np.flatnonzero(np.isfinite(plan.photos).all(axis=1))
     hints = [f"photo {plan.photo_ids[n]}" for n in centres]
-    layers.append(Marks(plan.photos[centres, :2], "photo open", "diamond", hints, "photo", 4.0))
+    size = 4.0 if len(centres) <= MANY else 2.5
+    layers.append(Marks(plan.photos[centres, :2], "photo open", "diamond", hints, "photo", size))
     named = _named(document)
     ring = [n for n, name in enumerate(plan.ids) if name in named]
     hints = [f"point {plan.ids[n]}: {', '.join(named[plan.ids[n]])}" for n in ring]
     layers.append(Marks(at[ring], "failed open", "dot", hints, "named by a finding or warning", 15.0))
-    order = sorted(range(len(plan.ids)), key=lambda n: (plan.ids[n] not in named, plan.role[n] == "new"))
-    names = [plan.ids[n] for n in order], [plan.photo_ids[n] for n in centres]
-    first = sum(plan.ids[n] in named or plan.role[n] != "new" for n in order)
-    places = np.concatenate([at[order[:first]], plan.photos[centres, :2], at[order[first:]]])
-    layers.append(Names(places, [*names[0][:first], *names[1], *names[0][first:]]))
+    ranks = {"control": 1, "check": 2, "new": 4}
+    called, left_out = shortened(plan.photo_ids)
+    labels = [(0 if name in named else ranks[plan.role[n]], at[n], name) for n, name in enumerate(plan.ids)]
+    labels += [(3, plan.photos[n, :2], called[plan.photo_ids[n]]) for n in centres]
+    labels.sort(key=itemgetter(0))
+    counts = [sum(rank <= last for rank, *_ in labels) for last in range(4)]
+    first = max((count for count in counts if count <= MOST_NAMED), default=MOST_NAMED)
+    layers.append(Names(np.array([place for _, place, _ in labels]), [name for *_, name in labels], first=first))
     bar = nice(2 * typical)
     caption = (
-        f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}. "
-        f"Both are {factor:.0f} times as large as the ground{', the longest cut off' if cut else ''}. "
-        f"{_towards(plan)} to the right."
+        f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}; "
+        f"both enlarged {factor:.0f} times against the ground{', the longest cut off' if cut else ''}. "
+        f"{_towards(plan)} to the right.{left_out}"
     )
     description = (
         f"{counted(len(plan.strips), 'strip')}, {counted(len(plan.ids), 'point')}; "
@@ -95,7 +104,12 @@ def plan_picture(plan: Plan) -> Picture:
     )
     bars = [ground_bar(extent), Bar(bar * factor, f"residuals {length(bar)}", "soft")]
     title = f"Plan of {document['name']}"
-    return chart("plan", (title, caption, description), [Map(layers)], bars=bars, north=plan.north)
+    return chart("plan", (title, caption, description), [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)
+
+
+def _extent(plan: Plan, at: Floats) -> float:
+    """Return how far a map of places reaches, each of its rows."""
+    return float(np.ptp(at, axis=0).max()) / plan.map_rows if len(at) else 1.0
 
 
 def _towards(plan: Plan) -> str:
@@ -153,17 +167,19 @@ def _precision_map(plan: Plan, part: str, sigma: Floats, what: str) -> list[Pict
         layers.append(
             Marks(at[rows], f"level-{level + 1}", "dot", hints, words, (4.0 + 1.3 * level) * share, len(order))
         )
-    layers.append(Names(at[::-1], [plan.ids[n] for n in order[::-1]]))
-    caption = f"The {what} of each point: strong, large dots are known worst, and are named first."
+    worst_named = order[: -WORST_NAMED - 1 : -1]
+    layers.append(Names(plan.points[worst_named, :2], [plan.ids[n] for n in worst_named]))
+    caption = f"The {what} of each point: strong, large dots are known worst; the worst have their names."
     worst = f"the largest is {short(float(ordered[-1]), 3)} m at {plan.ids[order[-1]]}"
     said = f"Precision in {part}", caption, f"{counted(len(order), 'point')}; {worst}."
-    bars = [ground_bar(float(np.ptp(at, axis=0).max()))]
-    return [chart(f"precision-{part}", said, [Map(layers)], bars=bars, north=plan.north)]
+    bars = [ground_bar(_extent(plan, at))]
+    return [chart(f"precision-{part}", said, [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)]
 
 
 NEAR = 1.5  # distances to the points of a photo, within which all points tell of the ground
 STEADY = 0.15  # extent of points, in distances to them, from which their plane may slope
 LOWEST_RAY = 0.1  # descent towards the plane, in principal distances, from which a ray meets the ground
+SQUARE_KM = 1e6  # m²
 CELLS = 140  # of the overlap along the longer side
 MOST_COLOURS = 6  # photos that are told apart by colour
 
@@ -227,21 +243,26 @@ def footprint_pictures(plan: Plan) -> list[Picture]:
     corners = list(outlines.values())
     layers: list[Layer] = [
         Areas(boxes, f"overlap overlap-{count}", words=counted(count, "photo") + " and more" * (count == MOST_COLOURS))
-        for count, boxes in enumerate(overlaps(corners), 1)
+        for count, boxes in enumerate(overlaps(corners, plan.map_rows), 1)
         if boxes
     ]
     kind = "open photo thin" if len(corners) <= 300 else "open photo hair"
     layers.append(Areas(corners, kind, [f"photo {photo}" for photo in outlines]))
-    layers.append(Names(np.array([each.mean(axis=0) for each in corners]), list(outlines), beside=False))
+    called, left_out = shortened(list(outlines))
+    many = len(corners) > MOST_NAMED  # then there is room for names outside only
+    at = np.array([each[np.argmax(each[:, 1])] if many else each.mean(axis=0) for each in corners])
+    layers.append(Names(at, list(called.values()), beside=many))
     sizes = {photo: area(outline) for photo, outline in outlines.items()}
     largest = max(sizes, key=lambda photo: sizes[photo])
     caption = (
         "What each photo shows of the ground as the adjusted points have it; colours: how many photos show the same. "
-        f"The largest footprint is that of photo {largest}, {sizes[largest] / 1e6:.3g} km²."
+        f"The largest footprint is that of photo {largest}, {_square(sizes[largest])}."
     )
-    words = "Footprints and overlap", caption, f"{counted(len(outlines), 'footprint')}."
-    bars = [ground_bar(float(np.ptp(np.concatenate(corners), axis=0).max()))]
-    return [chart("footprints", words, [Map(layers)], bars=bars, north=plan.north)]
+    if gsd := plan.document["summary"].get("gsd"):
+        caption += f" Ground sample distance {short(gsd['median'], 3)} m, the median of the photos."
+    words = "Footprints and overlap", caption + left_out, f"{counted(len(outlines), 'footprint')}."
+    bars = [ground_bar(_extent(plan, np.concatenate(corners)))]
+    return [chart("footprints", words, [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)]
 
 
 def area(outline: Floats) -> float:
@@ -249,10 +270,17 @@ def area(outline: Floats) -> float:
     return abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))) / 2
 
 
-def overlaps(outlines: list[Floats]) -> list[list[Floats]]:
-    """Count the photos over each cell of a grid; returned are boxes that cover the cells of 1, 2, ... photos."""
+def _square(size: float) -> str:
+    return f"{size / SQUARE_KM:.3g} km²" if size >= SQUARE_KM / 10 else f"{size:.0f} m²"
+
+
+def overlaps(outlines: list[Floats], rows: int = 1) -> list[list[Floats]]:
+    """Count the photos over each cell of a grid; returned are boxes that cover the cells of 1, 2, ... photos.
+
+    rows: of the map, in none of which a box goes on in the next.
+    """
     everything = np.concatenate(outlines)
-    low, cell = everything.min(axis=0), max(float(np.ptp(everything, axis=0).max()) / CELLS, 1e-9)
+    low, cell = everything.min(axis=0), max(float(np.ptp(everything, axis=0).max()) / (CELLS * rows), 1e-9)
     shape = np.ceil(np.ptp(everything, axis=0) / cell).astype(int) + 1
     counts = np.zeros((shape[1], shape[0]), int)
     for outline in outlines:
@@ -267,7 +295,8 @@ def overlaps(outlines: list[Floats]) -> list[list[Floats]]:
     boxes: list[list[Floats]] = [[] for _ in range(MOST_COLOURS)]
     growing: dict[tuple[int, int, int], int] = {}  # first row of the runs of cells that go on from row to row
     for row, line in enumerate([*np.minimum(counts, MOST_COLOURS), np.zeros(shape[0], int)]):
-        ends = np.flatnonzero(np.diff(line, prepend=0, append=0)).tolist()
+        borders = np.arange(CELLS, len(line), CELLS)
+        ends = np.union1d(np.flatnonzero(np.diff(line, prepend=0, append=0)), borders).tolist()
         runs = {(start, end, int(line[start])) for start, end in pairwise(ends) if line[start]}
         for start, end, count in sorted(growing.keys() - runs):
             boxes[count - 1].append(low + cell * box((start, end), (growing[start, end, count], row)))
@@ -285,6 +314,7 @@ MOST_PHOTOS = 300  # more of them are drawn as strips
 STRONG = 6  # points from which a tie is drawn thick
 FEW = 3  # points from which a tie is not weak
 LOOKS = {"thick": f"{STRONG} points and more", "": f"{FEW} to {STRONG - 1}", "dotted": f"fewer than {FEW}"}
+CROWDED = 4  # ties of a photo, from which the strong ones are hairlines, so that the weak ones show
 BOW = 0.16  # of a line: photos that are no neighbours lie on one line, and each of their ties is to be seen
 
 
@@ -308,6 +338,7 @@ def tie_pictures(plan: Plan) -> list[Picture]:
         return []
     what = "strip" if whole else "photo"
     layers: list[Layer] = []
+    crowded = len(ties) > CROWDED * len(nodes)
     for across in (False, True):
         for kind, words in LOOKS.items():
             pairs = {
@@ -319,15 +350,17 @@ def tie_pictures(plan: Plan) -> list[Picture]:
             if pairs:
                 start, end = (np.array([nodes[pair[side]] for pair in pairs]) for side in (0, 1))
                 hints = [f"{one} and {other}: {counted(count, 'point')}" for (one, other), count in pairs.items()]
-                colour = f"c2 faint {kind}" if across else f"c1 faint {kind}"
+                look = "hair" if crowded and kind == "thick" else f"faint {kind}"
+                colour = f"{'c2' if across and not alone else 'c1'} {look}"
                 both = f"{words}, {'between strips' if across else 'in a strip'}"
-                layers.append(Segments(start, end, colour, hints, words if whole else both, BOW))
+                layers.append(Segments(start, end, colour, hints, words if whole or alone else both, BOW))
     at = np.array(list(nodes.values()))
-    layers.append(
-        Marks(at, "photo", "dot", [f"{what} {name}" for name in nodes], size=6.0 if len(nodes) <= 100 else 4.0)
-    )
-    layers.append(Names(at, list(nodes)))
-    caption = f"Lines join {what}s that have points in common."
+    size = 6.0 if len(nodes) <= MANY else 4.0
+    layers.append(Marks(at, "photo", "dot", [f"{what} {name}" for name in nodes], size=size))
+    called, left_out = (dict.fromkeys(nodes), "") if whole else shortened(list(nodes))
+    layers.append(Names(at, [called[name] or name for name in nodes]))
+    caption = f"Lines join {what}s that have points in common.{left_out}"
+    caption += " The strongest are drawn thinnest, so that the weak ones show." * crowded
     weak = sum(count < FEW for count in ties.values()) if whole else 0
     if weak:
         caption += f" {counted(weak, 'tie')} of fewer than {FEW} points."
@@ -335,8 +368,9 @@ def tie_pictures(plan: Plan) -> list[Picture]:
     if lone:
         caption += f" Without a common point: {listed(lone)}."
     words = f"{counted(len(nodes), what)}, {counted(len(ties), 'tie')}."
-    bars = [ground_bar(float(np.ptp(at, axis=0).max()))]
-    return [chart("ties", (f"Ties between {what}s", caption, words), [Map(layers)], bars=bars, north=plan.north)]
+    said = f"Ties between {what}s", caption, words
+    bars = [ground_bar(_extent(plan, at))]
+    return [chart("ties", said, [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)]
 
 
 def _shared(sights: Iterable[tuple[str, str]]) -> Counter[tuple[str, str]]:

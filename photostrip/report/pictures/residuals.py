@@ -24,12 +24,12 @@ from photostrip.report.pictures.chart import (
     chart,
     nice,
 )  # fmt: skip
-from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, grouped, rays_of
+from photostrip.report.pictures.places import Flags, Plan, Rays, format_of, grouped, rays_of, shortened
 from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
-MOST_PHOTOS, COLUMNS = 24, 6  # on the picture
-MOST_RAYS = 150  # of a photo
+MOST_PHOTOS, COLUMNS = 24, (3, 6)  # on the picture, fewest and most
+MOST_RAYS = 1800  # of a photo, over the square of the columns: what a small photo holds
 CELLS = 8  # of the grid along the longer side of the image plane
 LEAST_IN_CELL = 3  # residuals from which a cell has a mean
 SHARE_ON_SCALE = 0.95  # share of the vectors that are not longer than a length of the scale
@@ -95,7 +95,10 @@ def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
     sizes = {photo: rms(rays.v[own][rays.used[own]]) for photo, own in rows.items()}
     worst = sorted(rows, key=lambda photo: -sizes[photo])[:MOST_PHOTOS]
     size = np.linalg.norm(rays.v, axis=1)
-    shown = {photo: sorted(own, key=lambda n: -size[n])[:MOST_RAYS] for photo, own in rows.items() if photo in worst}
+    columns = int(np.clip(np.ceil(len(worst) ** 0.5), *COLUMNS))
+    most = MOST_RAYS // columns**2
+    shown = {photo: sorted(own, key=lambda n: -size[n])[:most] for photo, own in rows.items() if photo in worst}
+    called, left_out = shortened(list(rows))
     drawn = [n for own in shown.values() for n in own]
     extent = _extent(plan, set(shown), at[drawn])
     longest = 0.2 * _longer(extent)
@@ -104,18 +107,21 @@ def _vectors(plan: Plan, rays: Rays, at: Floats, known: Flags) -> Picture:
     panels = []
     for photo, own in shown.items():
         hints = [f"point {rays.point[n]}: {rays.v[n, 0]:+.1f}, {rays.v[n, 1]:+.1f} µm" for n in own]
-        panels.append(vectors.panel(f"{photo}: {sizes[photo]:.1f} µm", at[own], rays.v[own], hints, rays.used[own]))
+        panels.append(
+            vectors.panel(f"{called[photo]}: {sizes[photo]:.1f} µm", at[own], rays.v[own], hints, rays.used[own])
+        )
     caption = (
         "Image residuals at their points, measured minus computed, and their rms in each photo. Errors of one point "
         "stand alone; errors of a photo or camera point the same way side by side."
     )
-    if any(len(rows[photo]) > MOST_RAYS for photo in shown):
-        caption += f" Of each photo the {MOST_RAYS} largest are drawn."
+    if any(len(rows[photo]) > most for photo in shown):
+        caption += f" Of each photo the {most} largest are drawn."
     if len(shown) < len(rows):
         caption += f" The {len(shown)} of {len(rows)} photos with the largest residuals, in flight order."
+    caption += left_out
     words = f"{counted(len(rows), 'photo')}; the largest rms is {sizes[worst[0]]:.1f} µm in photo {worst[0]}."
     bars = [Bar(bar * factor, f"{bar:g} µm")]
-    return chart("residuals", ("Image residuals by photo", caption, words), panels, columns=COLUMNS, bars=bars)
+    return chart("residuals", ("Image residuals by photo", caption, words), panels, columns=columns, bars=bars)
 
 
 def _planes(plan: Plan, rays: Rays, at: Floats, used: Flags) -> list[Picture]:

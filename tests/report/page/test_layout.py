@@ -113,13 +113,8 @@ def lines(table: Table, width: int) -> list[str]:
 
 
 def test_columns_of_low_rank_go_first_and_together() -> None:
-    columns = (
-        Column("point", left=True),
-        Column("value", "m"),
-        Column("first" * 6, rank=1),
-        Column("second" * 5, rank=2),
-        Column("third" * 6, rank=2),
-    )
+    others = (Column(head, rank=rank) for head, rank in (("first" * 6, 1), ("second" * 5, 2), ("third" * 6, 2)))
+    columns = Column("point", left=True), Column("value", "m"), *others
     table = Table(columns, (("P1", "1.000", "1", "2", "3"),))
     assert [word[:5] for word in lines(table, 200)[0].split()] == ["point", "value", "first", "secon", "third"]
     assert [word[:5] for word in lines(table, 100)[0].split()] == ["point", "value", "first"]
@@ -284,13 +279,9 @@ def test_short_work_shows_nothing_and_a_failure_takes_the_line_away() -> None:
 def test_a_terminal_that_is_gone_stops_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = Terminal()
     with progress(stream, patience=0.0) as line:
-        monkeypatch.setattr(stream, "write", _broken)
+        monkeypatch.setattr(stream, "write", lambda _: (_ for _ in ()).throw(OSError))
         line.at("going on")
         time.sleep(0.2)
-
-
-def _broken(_text: str) -> int:
-    raise OSError
 
 
 def test_the_bar_of_a_batch_shows_control_characters_and_sends_none() -> None:
