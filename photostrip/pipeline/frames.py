@@ -162,11 +162,15 @@ def curvature_left_out(inputs: Inputs, settings: Settings) -> bool:
     return settings.absolute.earth_curvature == "auto" and bool(inputs.frames) and inputs.frames[0].crs == "local"
 
 
+LEFT_OUT = "curvature-left-out"
+
+
 def _left_out(inputs: Inputs, settings: Settings, strips: Sequence[StripResult]) -> Iterator[Note]:
     """Say by how much plane map coordinates would bend what is measured, where that is more than a height's error."""
     control = inputs.control
     plan = control.enu[control.use[:, 0] & ~control.check, :2]
-    if len(plan) < 2 or not strips:
+    said = any(note.code == LEFT_OUT for strip in strips for note in strip.notes)  # it shows in one of them
+    if len(plan) < 2 or not strips or said:
         return
     reach = float(np.hypot(*(plan - (plan.max(axis=0) + plan.min(axis=0)) / 2.0).T).max())
     fall = float(curvature_correction(reach, settings.absolute.earth_radius))
@@ -176,7 +180,7 @@ def _left_out(inputs: Inputs, settings: Settings, strips: Sequence[StripResult])
             f"curvature is left out, {fall:.2f} m at {reach / 1000.0:.1f} km from the middle of the control; "
             "`earth_curvature: model` takes it into account, `earth_curvature: none` says that there is none"
         )
-        yield Note("curvature-left-out", text, severity="note", key="processing.earth_curvature")
+        yield Note(LEFT_OUT, text, severity="note", key="processing.earth_curvature")
 
 
 @dataclass(frozen=True, eq=False)

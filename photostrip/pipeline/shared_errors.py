@@ -46,13 +46,19 @@ from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import CAUSES, Evidence
-from photostrip.plausibility.given_points import Shared, ShiftedList, StretchedHeights, find_shared, significant
+from photostrip.plausibility.given_points import (
+    CURVED_SIGMAS,
+    Shared,
+    ShiftedList,
+    StretchedHeights,
+    find_shared,
+    significant,
+)
 from photostrip.points import ControlPoints
 from photostrip.strip.fitted_strip import CheckErrors
 
 Common = StretchedHeights | ShiftedList
 FIX = "take it from the certificate"
-CURVED_SIGMAS = 2.0  # standard deviations of k1, within which it is that of the Earth's curvature
 LEAST_WRONG = 0.03  # of a principal distance, from which it is wrong and not only another one
 OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
@@ -204,8 +210,10 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
     strips = [each for each in inputs.strips if each.camera.name == parameter.camera]
     camera = strips[0].camera
     would_fit = camera.principal_distance + parameter.value
+    of_cameras = inputs.positions is not None or (inputs.orientations is not None and inputs.orientations.observed)
+    given = ["control"] * bool(inputs.frames) + ["camera positions"] * of_cameras
     message = (
-        f"control and camera positions agree with the photos of camera {camera.name} at a principal distance of "
+        f"the photos of camera {camera.name} agree with {' and '.join(given)} at a principal distance of "
         f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm is given. "
         "The adjustment continued with the one that fits"
     )
@@ -272,9 +280,10 @@ def _lens(
         numbers: Evidence = {"radius_mm": radius}
         curved = None if earth_radius is None else _of_curvature(bundle, camera, earth_radius)
         if curved is not None and _looks_like(parameters, curved):
-            message += (
-                f". The Earth's curvature, which local coordinates taken as they are leave out, would look like k1 = "
-                f"{curved:.3g}"
+            message = (
+                "The Earth's curvature, which local coordinates taken as they are leave out, or a lens distortion that "
+                f"is not stated bends what photos of camera {name} show: {radius:.0f} mm from the principal point, "
+                f"{', '.join(parts)}; the curvature would look like k1 = {curved:.3g} mm^-2. {CONTINUED}"
             )
             fix = (
                 "are these map coordinates: name their crs, or set `processing.earth_curvature: model`; is the plane a "
@@ -420,6 +429,9 @@ def _finding(
     fix = f"{CAUSES[error.kind].cure}; what cannot be put right is taken up by `correction: {correction}`"
     if error.of == ALL and len(inputs.strips) > 1:
         fix += " with `group: block`"
+    timed = inputs.positions is None or np.isfinite(inputs.positions.time).all()
+    if drift is not None and not timed and not all(strip.listed for strip in inputs.strips):
+        fix += ", which of photos in no given order needs their times: fill the column time"
     photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo[rows]))
     return found("P208", message, fix, evidence, photos=photos, key=KEY)
 

@@ -26,6 +26,7 @@ from photostrip.pipeline.formed_models import LinkedModels, link_strip
 from photostrip.pipeline.formed_photos import FormedPhotos, form_strip
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import (
+    AUTO,
     SIMILARITY,
     Inputs,
     ModelStrip,
@@ -36,7 +37,7 @@ from photostrip.pipeline.inputs import (
     require_named,
 )
 from photostrip.pipeline.results import PlacedModels, StripResult
-from photostrip.plausibility.given_points import find_shared
+from photostrip.plausibility.given_points import find_curvature, find_shared
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip import absolute_orientation, fitted_strip, linked_models, polynomial
 from photostrip.strip.control_screening import (
@@ -361,6 +362,9 @@ def adjusted(screened: ScreenedStrip, settings: Settings) -> StripResult:
     xyz = oriented.xyz if correction is None else correction(oriented.xyz)
     wrong = notes.wrong_control_notes(strip, screened.screened_control)
     held = *notes.control_notes(strip, oriented.absolute), *notes.polynomial_notes(strip, correction, xyz)
+    if settings.absolute.earth_curvature == AUTO and oriented.frames[0].kind == "local":
+        bent = find_curvature(strip_at_control(oriented, (), oriented.misclosure_covariance()))
+        held = *held, *([] if bent is None else [notes.curvature_note(strip, bent, oriented.at_control)])
     result = partial(
         StripResult,
         stage=stage,

@@ -8,8 +8,10 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.local_frame import EARTH_RADIUS, curvature_correction
 from photostrip.notes import Note, counted
 from photostrip.pipeline.inputs import ModelStrip, Strip
+from photostrip.plausibility.given_points import Shared
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
@@ -137,6 +139,22 @@ def control_notes(strip: Strip | ModelStrip, orientation: AbsoluteOrientation) -
             f"{orientation.condition:.0f} times those of the other movements"
         )
         yield Note("weak-control", text, strip=strip.id)
+
+
+def curvature_note(strip: Strip | ModelStrip, bent: Shared, at_control: Floats) -> Note:
+    """Say that a strip is bent as the Earth's curvature would have it, and how to take that into account.
+
+    at_control: (n, 3), its points that are control, metres.
+    """
+    reach = float(np.ptp(at_control[:, 0])) / 2.0
+    fall = float(curvature_correction(reach, EARTH_RADIUS))
+    text = (
+        f"strip {strip.id} bends over its control as the Earth does, by {fall:.2f} m over "
+        f"{reach / 1000.0:.1f} km ({100 * bent.value[0]:.0f} % of the curvature, standard deviation "
+        f"{100 * bent.sigma[0]:.1g} %): local coordinates are taken as they are. Are they map coordinates, name their "
+        "crs, or write `earth_curvature: model`; is their plane a true one, `earth_curvature: none`"
+    )
+    return Note("curvature-left-out", text, strip=strip.id, key="processing.earth_curvature")
 
 
 def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, adjusted: Floats) -> Iterator[Note]:

@@ -494,6 +494,7 @@ def slip_in(
 
 
 MORE_THAN_ALONE = 1.0 + 1e-6  # of what one point explains: a list may have one point only
+CURVED_SIGMAS = 2.0  # standard deviations within which a bend is that of the Earth's curvature
 FALSE_ALARM = 1e-5  # probability of an error of all where there is none
 
 
@@ -543,6 +544,26 @@ def _stretch(strip: StripAtControl, whole: JointAdjustment, alone: float) -> Str
     if tested is None or also is None or tested.value[0] <= -1.0:  # level ground: heights turned over are its errors
         return None
     return StretchedHeights(float(tested.value[0]), float(tested.sigma[0]), tested.gain)
+
+
+def find_curvature(strip: StripAtControl) -> Shared | None:
+    """Find the Earth's curvature between a strip and plane coordinates; its value is 1 where it is all left out.
+
+    A strip lies D^2 / 2R lower than heights of a map, at the distance D from its middle. Its own bends stand in the
+    covariance of the misclosures: those of a sound strip are not taken for it. Source: [001] eq. 153.
+    """
+    _, strip = max(strip.sections, key=lambda each: float(np.ptp(each[1].placed[:, 0])))
+    if len(strip.coordinates.point) <= strip.design.shape[1] + 1:
+        return None
+    try:
+        laid = strip.laid
+        whole = adjust(laid, laid.misclosures(), strip.joint_covariance, bends=False)
+    except PhotostripError:
+        return None
+    place, d = strip.coordinates, strip.placed[:, :HEIGHT] - strip.placed[:, :HEIGHT].mean(axis=0)
+    fall = (d**2).sum(axis=1)[place.point] / (2.0 * EARTH_RADIUS)
+    found = _tested(whole, (-place.direction[:, HEIGHT] * fall)[:, None], 0.0)
+    return found if found is not None and abs(found.value[0] - 1.0) < CURVED_SIGMAS * found.sigma[0] else None
 
 
 def _relief(strip: StripAtControl, w: Floats) -> Floats:

@@ -217,7 +217,7 @@ def accuracy(document: Document) -> str:
     odd = [
         (listed(names), f"{_whole(document, role)[name]['rms']:.3f} m in {name}")
         for name in PARTS
-        if (names := _standing_out(document, role, name))
+        if (names := standing_out(document, role, name))
     ]
     out = [
         f"{' and '.join(text for _, text in group)} with {names}" for names, group in groupby(odd, key=itemgetter(0))
@@ -253,20 +253,23 @@ def _given(document: Document, role: str, *keys: str) -> Iterator[tuple[Any, ...
 
 
 def headline_rms(document: Document, role: str, part: str) -> Document:
-    """Return count and rms of the differences in plan or height without those that stand out, metres and µm."""
-    out = set(_standing_out(document, role, part))
+    """Return count, rms and largest of the differences in plan or height, metres and µm, of what does not stand out."""
+    out = set(standing_out(document, role, part))
     if not out:
         return dict(_whole(document, role)[part])
     axes, points = set("xy" if part == "plan" else "z"), _given(document, role, "id", "rejected", part, f"{part}_um")
     kept = [
-        sizes
+        (name, *sizes)
         for name, rejected, *sizes in points
         if name not in out and sizes[0] is not None and axes.isdisjoint(rejected or "")
     ]
-    return {"count": len(kept), **dict(zip(("rms", "rms_um"), map(_rms, zip(*kept, strict=True)), strict=True))}
+    names, metres, micrometres = zip(*kept, strict=True)
+    largest, worst = max(zip(map(abs, metres), names, strict=True))
+    sums = {"rms": _rms(metres), "rms_um": _rms(micrometres), "max": largest, "worst": worst}
+    return {"count": len(kept), **sums}
 
 
-def _standing_out(document: Document, role: str, part: str) -> list[str]:
+def standing_out(document: Document, role: str, part: str) -> list[str]:
     return [name for name, parts in _given(document, role, "id", "stands_out") if part in parts]
 
 

@@ -7,9 +7,10 @@ from itertools import product
 from typing import Any
 
 from photostrip.errors import PhotostripError
-from photostrip.notes import Document
+from photostrip.notes import Document, listed
 from photostrip.report.page.parts import Words
-from photostrip.report.page.tables import Field
+from photostrip.report.page.tables import Field, note_of
+from photostrip.result.verdict import headline_rms, standing_out
 from photostrip.sheets.sheet import Fact, Rows, Sheet, hidden
 
 ROLES, PARTS = ("check", "control"), ("plan", "height")
@@ -38,7 +39,7 @@ def methods_sheet(name: str, methods: Mapping[str, Document | PhotostripError]) 
             found["counts"]["points"],
             found["summary"]["sigma0_um"],
             found["summary"]["redundancy"],
-            *(found["summary"][role][part][each.key] for role, part in places for each in LEFT_OVER),
+            *(headline_rms(found, role, part)[each.key] for role, part in places for each in LEFT_OVER),
             *_precision(found),
         )
         for method, found in done.items()
@@ -61,22 +62,30 @@ def _precision(found: Document) -> list[float | None]:
 def _table(done: Mapping[str, Document], role: str) -> Rows:
     shown = [each for each in LEFT_OVER if each.shown]
     columns = [Field("", head=f"at {role} points")]
-    columns += [Field("", each.form, part if each.key == "count" else each.name) for part in PARTS for each in shown]
+    columns += [
+        Field("", each.form, part, "points") if each.key == "count" else Field("", each.form, each.name)
+        for part in PARTS
+        for each in shown
+    ]
     columns += [Field("", "m 3", f"σ {part}", rank=1) for part in PARTS if role == "check"]
     rows = [
         (
             method,
-            *(found["summary"][role][part][each.key] for part in PARTS for each in shown),
+            *(headline_rms(found, role, part)[each.key] for part in PARTS for each in shown),
             *(_precision(found) if role == "check" else ()),
         )
         for method, found in done.items()
     ]
-    note = "µm: at photo scale; σ: rms of the standard deviations of all points" if role == "check" else ""
+    odd = {name for found in done.values() for part in PARTS for name in standing_out(found, role, part)}
+    note = note_of(
+        "µm: at photo scale; σ: rms of the standard deviations of all points" if role == "check" else "",
+        f"without {listed(sorted(odd))}, too far off beside the others" if odd else "",
+    )
     return Rows("", "Methods side by side" if role == "check" and done else "", columns, rows, note=note)
 
 
 def _best(done: Mapping[str, Document], part: str) -> str | None:
-    rms = {method: found["summary"]["check"][part]["rms"] for method, found in done.items()}
+    rms = {method: headline_rms(found, "check", part)["rms"] for method, found in done.items()}
     known = {method: float(value) for method, value in rms.items() if value is not None}
     return min(known, key=known.__getitem__) if known else None
 

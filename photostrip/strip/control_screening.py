@@ -421,6 +421,12 @@ class FoundErrors(NamedTuple):
         """What was taken out of the given coordinates."""
         return tuple(column for column in self.out if column < self.whole.coordinates)
 
+    @property
+    def far(self) -> FoundErrors:
+        """What is wrong even of a strip that is bent itself."""
+        parts = (each.columns for each in self.whole.tests(self.out) if each.ratio > FAR**2) if self.out else ()
+        return FoundErrors(self.whole, tuple(chain.from_iterable(parts)))
+
 
 def kept_of(strip: StripAtControl, found: FoundErrors) -> Flags:
     """Coordinates that stay (n, 3)."""
@@ -550,6 +556,7 @@ def _exchanges(strip: StripAtControl, found: FoundErrors) -> dict[int, int]:
 
 DRAWN, DRAWS = 3, 200  # points of a similarity, and similarities: of half good points, one in eight is of these alone
 KEPT = 5.0  # median residuals within which a point goes with the others
+FAR = 100.0  # times what is left at all others: no bend of a strip moves one point so far
 BENT = 2.5  # standard deviation of unit weight beyond which more is wrong with a strip than its control
 
 
@@ -600,11 +607,9 @@ def search(strip: StripAtControl) -> FoundErrors | None:
         kept[full] = majority(strip.xyz[full], strip.targets.of_full[full])[:, None]
         much = (_found(strip, much=True, bends=bends) for bends in (True, False))
         found = [*first, *chain.from_iterable(much), *_found(strip, kept)]
-    told = [
-        each
-        for each in found
-        if each.whole.allows(each.out) and each.left.squares <= BENT**2 * max(each.left.freedom, 1)
-    ]
+    allowed = [each for each in found if each.whole.allows(each.out)]
+    told = [each for each in allowed if each.left.squares <= BENT**2 * max(each.left.freedom, 1)]
+    told = told or [far for each in allowed if (far := each.far).out]
     if not told:
         return FoundErrors(first[0].whole, ()) if first else None
     # of two equally small explanations the one that blames less control, or explains more

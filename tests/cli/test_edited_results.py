@@ -160,8 +160,7 @@ def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: 
     for part in above:
         place = place[int(part[1:-1])] if part.startswith("[") else place[part]
     place[int(last[1:-1]) if last.startswith("[") else last] = "@"
-    file = tmp_path / "result.json"
-    file.write_text(json.dumps(document).replace('"@"', text), encoding="utf-8")
+    (file := tmp_path / "result.json").write_text(json.dumps(document).replace('"@"', text), encoding="utf-8")
     with pytest.raises(InputError) as caught:
         read_result(str(file))
     (fault,) = caught.value.faults
@@ -174,8 +173,7 @@ def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: 
 def test_a_missing_key_is_told_with_all_that_lead_to_it(more: list[str], tmp_path: Path, call: Call) -> None:
     document = json.loads(RESULT.read_text(encoding="utf-8"))
     del document["models"]["left"]
-    file = tmp_path / "result.json"
-    file.write_text(to_json(document), encoding="utf-8")
+    (file := tmp_path / "result.json").write_text(to_json(document), encoding="utf-8")
     code, _, err = call(more[0], file, *more[1:])
     assert (code, "models.left: is missing" in err) == (2, True)
 
@@ -217,8 +215,7 @@ def test_control_characters_are_shown_and_never_sent(tmp_path: Path, answer: Ans
     document = json.loads(RESULT.read_text(encoding="utf-8"))
     document["name"] += ESCAPE
     document["control"]["id"][0] = ESCAPE
-    file = tmp_path / "result.json"
-    file.write_text(to_json(document), encoding="utf-8")
+    (file := tmp_path / "result.json").write_text(to_json(document), encoding="utf-8")
     assert read_result(str(file))["control"][0]["id"] == ESCAPE
     for form in ("text", "md", "github", "json"):
         out = answer("report", file, "--format", form)

@@ -121,8 +121,7 @@ def test_a_misspelled_key_is_not_missing_besides(tmp_path: Path, old: str, new: 
 def test_a_file_for_another_command_is_told_as_such(
     tmp_path: Path, command: str, key: str, words: str, call: Call
 ) -> None:
-    file = tmp_path / "a.yaml"
-    file.write_text(f"{key}: 1\nname: a\n", encoding="utf-8")
+    (file := tmp_path / "a.yaml").write_text(f"{key}: 1\nname: a\n", encoding="utf-8")
     code, out, err = call(command, file, *(["-o", tmp_path / "out"] if command == "simulate" else []))
     assert code == 2
     (line,) = (line for line in (out + err).splitlines() if line.startswith("error: "))
@@ -196,8 +195,7 @@ def test_a_grid_that_is_no_file_is_refused_in_the_same_words(
 def test_every_command_refuses_its_file_in_the_same_words(
     tmp_path: Path, command: str, options: list[str], harm: Callable[[Path], None], kind: str, words: str, call: Call
 ) -> None:
-    path = tmp_path / "file"
-    path.write_text(PROJECT, encoding="utf-8")
+    (path := tmp_path / "file").write_text(PROJECT, encoding="utf-8")
     harm(path)
     code, out, err = call(command, path, *options)
     assert (code, out) == (2, "")

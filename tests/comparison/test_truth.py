@@ -189,8 +189,7 @@ def test_an_edited_truth_is_refused_at_its_key(edit: str, tmp_path: Path, capsys
     change, key = EDITS[edit]
     change(truth)
     result.write(tmp_path)
-    file = tmp_path / "truth.json"
-    file.write_text(json.dumps(truth), encoding="utf-8")
+    (file := tmp_path / "truth.json").write_text(json.dumps(truth), encoding="utf-8")
     assert main(["compare", str(tmp_path), str(file), "--format", "json"]) == 2
     finding = json.loads(capsys.readouterr().out)["findings"][0]
     assert (finding["file"], finding["key"]) == (str(file), key)

@@ -204,8 +204,7 @@ def test_an_interrupt_while_files_are_renamed_leaves_them_all_new(
 
 
 def test_a_file_that_was_read_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    given = tmp_path / "points.csv"
-    given.write_text("given", encoding="utf-8")
+    (given := tmp_path / "points.csv").write_text("given", encoding="utf-8")
     (tmp_path / "link.csv").symlink_to(given)
     monkeypatch.chdir(tmp_path)
     for name in nonempty(("points.csv", "link.csv")):

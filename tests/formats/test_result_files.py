@@ -99,8 +99,7 @@ def test_angles_are_named_by_system_and_unit() -> None:
 
 @pytest.mark.slow
 def test_a_result_is_read_back(tmp_path: Path) -> None:
-    file = tmp_path / "result.json"
-    file.write_text(to_json(with_odd_ids()), encoding="utf-8")
+    (file := tmp_path / "result.json").write_text(to_json(with_odd_ids()), encoding="utf-8")
     assert plain_of(read_result(str(file))) == plain_of(with_odd_ids())
     ascii_only = to_json(with_odd_ids(), ascii_only=True)
     assert ascii_only.isascii()
@@ -117,8 +116,7 @@ def test_a_result_is_read_back(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    file = tmp_path / "result.json"
-    file.write_text(text, encoding="utf-8")
+    (file := tmp_path / "result.json").write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as caught:
         read_result(str(file))
     assert words in str(caught.value)

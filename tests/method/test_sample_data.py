@@ -293,6 +293,15 @@ def test_a_similarity_on_all_strasbourg_control_leaves_what_others_found() -> No
     assert rms(differences(strasbourg(), check=False)) == pytest.approx([0.10, 0.07, 0.36], abs=0.01)
 
 
+@pytest.mark.parametrize("method", ["similarity", "bundle"])
+def test_a_digit_of_a_thousand_metres_is_found_although_the_strasbourg_control_fits_badly(method: str) -> None:
+    inputs = project(SXB).inputs
+    wrong = inputs.control.enu + np.outer([name == "317" for name in inputs.control.ids], [1000.0, 0.0, 0.0])
+    inputs = replace(inputs, control=replace(inputs.control, enu=wrong))
+    found = triangulate(inputs, with_settings(SXB, adjustment=method)).strips[0].screened_control.rejections
+    assert [inputs.control.ids[each.row] for each in found] == ["317"]
+
+
 @pytest.mark.parametrize("first", [0, 1])
 def test_strasbourg_check_points_are_as_weak_in_height_as_others_found(first: int) -> None:
     found = strasbourg(tuple(in_order_of_ids()[first::2]))

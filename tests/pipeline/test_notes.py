@@ -27,6 +27,7 @@ from tests.simulated import inputs_of, settings_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
+    from photostrip.notes import Note
     from photostrip.pipeline.inputs import Strip
     from photostrip.strip.polynomial import Polynomial
 
@@ -47,20 +48,27 @@ def test_points_beyond_the_control_are_told_with_how_far(begin: float, end: floa
     assert words in " ".join(note.message for note in notes)
 
 
-def of_curvature(photos: int, curvature: str = "auto") -> list[str]:
+def of_curvature(photos: int, curvature: str = "auto", scale: float = 10_000.0, adjustment: str = "auto") -> list[Note]:
     """Remarks on curvature of a strip whose map coordinates are given as local ones."""
-    simulation = simulate(Spec(seed=2, flight=Flight(photos=photos), control=Control(bands=3)))
-    inputs, settings = inputs_of(simulation), settings_of(simulation)
+    simulation = simulate(Spec(seed=2, flight=Flight(photos=photos, scale=scale), control=Control(bands=3)))
+    inputs, settings = inputs_of(simulation), replace(settings_of(simulation), adjustment=adjustment)
     inputs = replace(inputs, frames=(replace(inputs.frames[0], crs="local"),))
     settings = replace(settings, absolute=replace(settings.absolute, earth_curvature=curvature))
-    return [note.message for note in triangulate(inputs, settings).notes if note.code == "curvature-left-out"]
+    return [note for note in triangulate(inputs, settings).notes if note.code == "curvature-left-out"]
 
 
 def test_what_is_left_out_is_said_with_the_key_that_takes_it_in() -> None:
     """Eleven bases of 920 m: the middle lies 5.1 km from the ends."""
-    (message,) = of_curvature(12)
-    assert "2.1" in message
-    assert "`earth_curvature: model`" in message
+    (note,) = of_curvature(12)
+    assert "2.1" in note.message
+    assert "`earth_curvature: model`" in note.message
+    assert note.severity == "note"
+
+
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial", "bundle"])
+def test_a_strip_that_bends_as_the_earth_does_is_warned_of(adjustment: str) -> None:
+    (note,) = of_curvature(23, scale=30_000.0, adjustment=adjustment)
+    assert (note.severity, "bends over its control as the Earth does" in note.message) == ("warning", True)
 
 
 @pytest.mark.parametrize(("photos", "curvature"), [(3, "auto"), (12, "model"), (12, "none")])

@@ -41,8 +41,7 @@ def listed(exchanged: set[int], *, factor: float = 1.0, noise: float = SIGMA) ->
 
 def faults(tmp_path: Path, listing: tuple[str, frozenset[str]]) -> list[tuple[str, str]]:
     """Give code and message of what is refused."""
-    path = tmp_path / "pairs.csv"
-    path.write_text(listing[0], encoding="utf-8")
+    (path := tmp_path / "pairs.csv").write_text(listing[0], encoding="utf-8")
     findings = Findings()
     read_measurements([str(path)], findings, Manner(sigma=SIGMA, photos=listing[1]))
     return [(each.code, each.message) for each in findings.faults]

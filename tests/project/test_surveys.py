@@ -124,8 +124,7 @@ def test_overrides_and_extends(tmp_path: Path) -> None:
     path = write(tmp_path)
     survey = load_survey(path, ["processing.significance=0.01", "processing.moved_camera=never"])
     assert (survey.settings.significance, survey.settings.moved_camera) == (0.01, "never")
-    child = tmp_path / "child.yaml"
-    child.write_text("extends: survey.yaml\nname: child\n", encoding="utf-8")
+    (child := tmp_path / "child.yaml").write_text("extends: survey.yaml\nname: child\n", encoding="utf-8")
     survey = load_survey(child)
     assert survey.name == "child"
     assert len(survey.files) == 3
@@ -182,8 +181,7 @@ cameras:
 
 
 def test_a_list_of_the_user_adds_and_replaces(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(PRESETS, encoding="utf-8")
+    (file := tmp_path / "mine.yaml").write_text(PRESETS, encoding="utf-8")
     known = read_presets(str(file))
     assert list(known) == ["Photheo 19/1318", "UMK 10/1318", "P32"]
     assert known["UMK 10/1318"].principal_distance == 99.07
@@ -211,8 +209,7 @@ def test_a_list_of_the_user_adds_and_replaces(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected: list[str]) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(text, encoding="utf-8")
+    (file := tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as caught:
         read_presets(str(file))
     told = str(caught.value)

@@ -72,9 +72,7 @@ def given_table(document: Document, given: Rows, role: str, most: int | None) ->
     known = (size for size, out in zip(given.values("normalised"), given.values("rejected"), strict=True) if not out)
     plan, height = summary[role]["plan"], summary[role]["height"]
     over = max((each for each in known if each is not None), default=None)
-    rms, mean, most_of_all = _sums(
-        document, given, *({key: summary[f"{role}_{of}"][key[1]] for key in DIFFERENCES} for of in ("rms", "mean"))
-    )
+    rms, mean, most_of_all = _sums(document, given)
     rms |= {"plan_um": micrometres(plan["rms_um"]), "height_um": micrometres(height["rms_um"])}
     rms |= {"normalised": fixed(summary[role]["normalised"], 2)}
     most_of_all |= {"plan_um": micrometres(plan["max_um"]), "height_um": micrometres(height["max_um"])}
@@ -96,20 +94,23 @@ def _used(row: Document) -> str:
     return f"{kept} -{row['rejected']}".strip()
 
 
-def _sums(
-    document: Document, rows: Sequence[Document], rms: dict[str, float | None], mean: dict[str, float | None]
-) -> list[dict[str, str]]:
-    """Return the lines below differences: rms, mean, and the largest along each axis of those not rejected."""
-    largest = {}
-    for axis, key in zip(document["frame"]["axes"], DIFFERENCES, strict=True):
-        letter = LETTERS.get(axis, axis)
-        sizes = (row[key] for row in rows if letter not in row.get("rejected", "") and row[key] is not None)
-        largest[key] = signed(max(sizes, key=fabs, default=None))
+def _sums(document: Document, rows: Rows) -> list[dict[str, str]]:
+    """Return the lines below differences: rms, mean and largest along each axis of those that count."""
+    axes = zip(DIFFERENCES, document["frame"]["axes"], strict=True)
+    values = {key: [row[key] for row in rows if row[key] is not None and _counts(row, axis)] for key, axis in axes}
     return [
-        {"id": "rms"} | {key: metres(value) for key, value in rms.items()},
-        {"id": "mean"} | {key: signed(value) for key, value in mean.items()},
-        {"id": "largest"} | largest,
+        {"id": "rms"} | {key: metres(_rms(own)) for key, own in values.items()},
+        {"id": "mean"} | {key: signed(sum(own) / len(own) if own else None) for key, own in values.items()},
+        {"id": "largest"} | {key: signed(max(own, key=fabs, default=None)) for key, own in values.items()},
     ]
+
+
+def _counts(row: Document, axis: str) -> bool:
+    """Whether a difference counts in sums: not at rejected control, nor at a check point beside all others."""
+    out = row["stands_out"] if row.get("role") == "check" else ()
+    if axis not in LETTERS:  # neither plan nor height
+        return not row.get("rejected") and not out
+    return LETTERS[axis] not in row.get("rejected", "") and ("height" if axis == "up" else "plan") not in out
 
 
 def _unused(document: Document) -> Iterator[Part]:
@@ -145,7 +146,7 @@ def check(document: Document, most: int | None = None) -> Iterator[Part]:
     blank = dict.fromkeys(quantities)
     rows = [blank | known.get(row["id"], {}) | row | UNTESTED | tested.get(row["id"], {}) for row in shown]
     odd = [row["id"] for row in given if row["stands_out"]]
-    below = note_of(note, MEANING, f"rms of z without {listed(odd, IDS_NAMED)}" if odd else "")
+    below = note_of(note, MEANING, f"the last lines are without {listed(odd, IDS_NAMED)}" if odd else "")
     seen = {part: (tests[part]["rms"], tests[part]) for part in PARTS}
     yield _unseen(document, given, rows, seen, "use:2 strips:3", below, quantities)
 
@@ -193,9 +194,7 @@ def _unseen(
         95 % limits.
     more: further columns.
     """
-    values = {key: [value for row in rows if (value := row[key]) is not None] for key in DIFFERENCES}
-    means = {key: sum(own) / len(own) if own else None for key, own in values.items()}
-    rms, *others = _sums(document, rows, {key: _rms(own) for key, own in values.items()}, means)
+    rms, *others = _sums(document, rows)
     rms |= {key: fixed(ratio, 2) for key, (ratio, _) in seen.items()}
     inside = {key: f"{part['inside_95']} of {part['count']}" for key, (_, part) in seen.items() if part["count"]}
     plan, height = seen

@@ -59,8 +59,7 @@ def planned(answer: Answer, kind: str, *arguments: object) -> Any:  # noqa: ANN4
 def test_keys_that_are_set_and_a_file_say_the_same(
     kind: str, keys: list[str], text: str, answer: Answer, tmp_path: Path
 ) -> None:
-    file = tmp_path / "plan.yaml"
-    file.write_text(f"photostrip_plan_{kind}: 1\n{text}")
+    (file := tmp_path / "plan.yaml").write_text(f"photostrip_plan_{kind}: 1\n{text}")
     assert planned(answer, kind, file) == planned(answer, kind, *keys)
 
 
@@ -113,8 +112,7 @@ TWO = CAMERAS.partition("cameras:\n")[2]
     ],
 )  # fmt: skip
 def test_a_wrong_list_of_cameras_is_refused(text: str, message: str, call: Call, tmp_path: Path) -> None:
-    file = tmp_path / "c.yaml"
-    file.write_text(f"photostrip_plan_cameras: 1\ncameras:\n{text}")
+    (file := tmp_path / "c.yaml").write_text(f"photostrip_plan_cameras: 1\ncameras:\n{text}")
     found, _, err = call("plan", "camera", str(file))
     assert (found, message in err) == (2, True)
 
@@ -159,8 +157,7 @@ element_errors: {dby_um: 4, dbz_um: -3, dkappa_arcsec: 6, dalpha_arcsec: -4, dom
 
 
 def test_given_errors_come_out_as_errors_of_points(answer: Answer, tmp_path: Path) -> None:
-    file = tmp_path / "m.yaml"
-    file.write_text(GIVEN)
+    (file := tmp_path / "m.yaml").write_text(GIVEN)
     document = planned(answer, "model", file)
     parts: dict[str, dict[str, list[float]]] = {}
     for row in nonempty(document["errors"]):
@@ -281,8 +278,7 @@ place: {points: 1, into: ends, method: similarity}
 
 @pytest.mark.slow
 def test_the_report_of_a_strip(answer: Answer, tmp_path: Path) -> None:
-    file = tmp_path / "s.yaml"
-    file.write_text(STRIP)
+    (file := tmp_path / "s.yaml").write_text(STRIP)
     text = answer("plan", "strip", str(file))
     for told in ("0.050 0.050 0.080, offset free", "3/2 xy", "0.500 m in height", "Best places", "never"):
         assert told in text

@@ -79,8 +79,7 @@ def answer(said: Said) -> Answer:
 
 
 def test_directions_and_photo_are_inverse(tmp_path: Path, said: Said) -> None:
-    table = tmp_path / "points.csv"
-    table.write_text("point,x,z\nA,80,60\nB,-70.5,12.25\nC,0,0\n", encoding="utf-8")
+    (table := tmp_path / "points.csv").write_text("point,x,z\nA,80,60\nB,-70.5,12.25\nC,0,0\n", encoding="utf-8")
     camera = "camera={preset: Photheo 19/1318, principal_point: [0.1, -0.2]}"
     held = (camera, "alpha=350", "omega=12", "kappa=-3", "angles=gon")
     out = said("directions", f"table={table}", *held, "--format", "csv")
