@@ -48,7 +48,7 @@ OF_CAMERAS = {
 }
 """What may be wrong with a camera, with the columns of its parameters."""
 OF_LENSES = LENS, EDGE, DECENTRED
-PLAINER = {EDGE: LENS}
+PLAINER = {EDGE: LENS, DRIFT: OFFSET}
 """What is asked for less: at the end a hypothesis has to explain more than it."""
 OF_PHOTOS = {SHIFT: PRINCIPAL_POINT, SCALE: [PRINCIPAL_DISTANCE]}
 """What may be wrong with one photo: it has a principal point, or a principal distance, of its own."""

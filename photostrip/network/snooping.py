@@ -223,9 +223,10 @@ class _Search:
         try:
             done = self.adjust(selection)
         except GeometryError:
-            if not self._reordered(selection):
+            reordered = self._reordered(selection)
+            if reordered is None:
                 raise
-            done = self.adjust(supported(self.problem, selection))
+            done = self.adjust(supported(self.problem, reordered))
         while True:
             worst = self._worst(done)
             found = self._with_likeliest(done, worst)
@@ -320,8 +321,8 @@ class _Search:
         """
         of_worst = self._log_p(done, worst)
         likely_ones = self._likeliest(done, of_worst)
-        if likely_ones and self._reordered(done.selection):
-            return self.adjust(supported(self.problem, done.selection))
+        if likely_ones and (reordered := self._reordered(done.selection)) is not None:
+            return self.adjust(supported(self.problem, reordered))
         before, solution, tried = self.problem, done.solution, {}
         for each in likely_ones:
             found = self._with(each.hypothesis, done.selection)
@@ -406,20 +407,25 @@ class _Search:
             return -np.inf
         return hypotheses.log_probability_again(solution, hypothesis, done.limit.unit)
 
-    def _reordered(self, selection: Selection) -> bool:
-        """Give photos the positions of other rows, where an adjustment without any of them says so; asked once."""
+    def _reordered(self, selection: Selection) -> Selection | None:
+        """Give photos the positions of other rows, where an adjustment without any of them says so; asked once.
+
+        What was taken out of them went for the order: all come back.
+        """
         used = selection.positions.any()
         if self.order_asked or not used or is_free(replace(self.problem, positions=PositionObservations())):
-            return False
+            return None
         self.order_asked = True
         try:
             solution, found = self._order(self.problem, supported(self.problem, selection))
         except GeometryError:
-            return False
-        if found is not None:
-            self.problem = restarted(self.problem, solution)
-            self._take_up(found)
-        return found is not None
+            return None
+        if found is None:
+            return None
+        self.problem = restarted(self.problem, solution)
+        self._take_up(found)
+        self.out = {key: each for key, each in self.out.items() if key[0] != POSITION}
+        return replace(selection, positions=Selection.everything(self.problem).positions)
 
     def _order(self, problem: BundleProblem, selection: Selection) -> tuple[BundleSolution, Hypothesis | None]:
         """Ask an adjustment in which positions take no part in which order they are those of the photos.

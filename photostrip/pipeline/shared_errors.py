@@ -210,8 +210,10 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
     strips = [each for each in inputs.strips if each.camera.name == parameter.camera]
     camera = strips[0].camera
     would_fit = camera.principal_distance + parameter.value
+    of_cameras = inputs.positions is not None or (inputs.orientations is not None and inputs.orientations.observed)
+    given = ["control"] * bool(inputs.frames) + ["camera positions"] * of_cameras
     message = (
-        f"control and camera positions agree with the photos of camera {camera.name} at a principal distance of "
+        f"the photos of camera {camera.name} agree with {' and '.join(given)} at a principal distance of "
         f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm is given. "
         "The adjustment continued with the one that fits"
     )
@@ -427,6 +429,9 @@ def _finding(
     fix = f"{CAUSES[error.kind].cure}; what cannot be put right is taken up by `correction: {correction}`"
     if error.of == ALL and len(inputs.strips) > 1:
         fix += " with `group: block`"
+    timed = inputs.positions is None or np.isfinite(inputs.positions.time).all()
+    if drift is not None and not timed and not all(strip.listed for strip in inputs.strips):
+        fix += ", which of photos in no given order needs their times: fill the column time"
     photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo[rows]))
     return found("P208", message, fix, evidence, photos=photos, key=KEY)
 

@@ -291,9 +291,10 @@ def _cameras(block: Document, pixels: dict[str, float]) -> Iterator[tuple[str, f
         own = list(group)
         said = ", ".join(_parameter(each, pixels.get(camera)) for each in own)
         pairs = [
-            (value, _name(one), _name(other) + (f" of {other['camera']}" if other["camera"] != camera else ""))
+            (value, _name(one), _name(other) + whose * (other["camera"] != camera))
             for one in own
             for other, value in zip(rows, one["correlations"], strict=False)
+            for whose in [f" of {other['camera'].removeprefix('of ')}"]
             if other is not one and value is not None
         ]
         if pairs:

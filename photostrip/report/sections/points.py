@@ -38,7 +38,7 @@ PARTS = "plan", "height"
 IDS_NAMED = 12
 WORST_POINTS = 8
 FAILED_SHOWN = 3  # folds of a cross-validation that could not be adjusted
-MOST_MARKS = 100  # marks: a page of a large block can still be mailed
+MOST_MARKS, WORST_MARKS = 100, 50  # of given points: more are summed up point by point, with the worst of them
 UNTESTED = dict.fromkeys(("plan", "height", "p_plan", "p_height"))
 MEANING = (
     "σ: of the adjusted point; d/σ: difference over its standard deviation, with that of the given point (in plan by "
@@ -254,7 +254,8 @@ def images(document: Document) -> Iterator[Part]:
     columns = {"photos": "id image_rms_um points strip:1 *:2", "points": "id image_rms_um rays role:1 *:2"}
     for block, keys in columns.items():
         rows = document[block]
-        yield keyed(taken(rows, largest_of(rows, "image_rms_um", WORST_POINTS)), keys, f"the worst {block}")
+        worst = taken(rows, largest_of(rows, "image_rms_um", WORST_POINTS))
+        yield keyed(worst, keys, f"the worst {len(worst)} of {len(rows)} {block}")
 
 
 def precision(document: Document) -> Iterator[Part]:
@@ -329,8 +330,9 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
         lengths = [mark["length"] for mark in own]
         shown, note = worst_first(own, lengths, ("mark", "marks", "residuals"), most)
         if len(shown) > MOST_MARKS:
-            shown = nlargest(MOST_MARKS, own, key=itemgetter("length"))
-            note = f"the worst {MOST_MARKS} of {len(own)}; `residuals` in result.json has all"
+            yield _by_point(own, unit, decimals)
+            shown = nlargest(WORST_MARKS, own, key=itemgetter("length"))
+            note = f"the worst {WORST_MARKS} of {len(own)}; `residuals` in result.json has all"
         tested = any(mark["test"] is not None for mark in shown)
         columns = (
             *map(Field, ("point", "role", "photo")),
@@ -340,6 +342,23 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
         )
         below = note_of(note, "test: the larger of both over its standard deviation" if tested else "")
         yield tabulated(columns, ([mark[column.key] for column in columns] for mark in shown), below)
+
+
+def _by_point(marks: Sequence[Document], unit: str, decimals: int) -> Table:
+    """Sum up the marks of each given point, in the order of the list."""
+    columns = (
+        *map(Field, ("point", "role")),
+        Field("marks", " 0"),
+        *fields("rms largest", f"{unit} {decimals}"),
+        Field("photo", head="on"),
+    )
+    rows = []
+    for _, group in groupby(marks, itemgetter("point")):
+        own = list(group)
+        worst = max(own, key=itemgetter("length"))
+        rms = (sum(mark["length"] ** 2 for mark in own) / (2 * len(own))) ** 0.5
+        rows.append([worst["point"], worst["role"], len(own), rms, worst["length"], worst["photo"]])
+    return tabulated(columns, rows, "rms of a coordinate; largest: the mark farthest from its point")
 
 
 def _marks(document: Document) -> Iterator[Document]:
