@@ -246,7 +246,7 @@ def footprint_pictures(plan: Plan) -> list[Picture]:
         for count, boxes in enumerate(overlaps(corners, plan.map_rows), 1)
         if boxes
     ]
-    kind = "open photo thin" if len(corners) <= 300 else "open photo hair"
+    kind = "open photo thin" if len(corners) <= MANY else "open photo hair"
     layers.append(Areas(corners, kind, [f"photo {photo}" for photo in outlines]))
     called, left_out = shortened(list(outlines))
     many = len(corners) > MOST_NAMED  # then there is room for names outside only
