@@ -89,7 +89,7 @@ def stages(document: Document, most: int) -> Iterator[Row]:
             for key, what in (("control_rms", "control"), ("check_rms", "check points"))
             if classical[key]["plan"] is not None or classical[key]["height"] is not None
         ]
-        yield "polynomials instead", f"{degrees(classical['strips'])}; rms in plan/height {', '.join(left)}"
+        yield "by polynomials", f"{degrees(classical['strips'])}; rms in plan/height {', '.join(left)}"
 
 
 def _verdict(test: Document) -> str:
@@ -167,7 +167,9 @@ def shared_parameters(document: Document) -> Iterator[Part]:
     if shared := tuple(taken_up(block, NAMED)):
         yield Facts(shared)
     if len(block["corrections"]):
-        note = "added to the given positions of a strip; a drift is per unit of time"
+        note = (
+            "added to the given positions of a strip; a drift from photo to photo, or for each unit of the given times"
+        )
         yield keyed(block["corrections"], "name value sigma", note)
     yield from _highly_correlated(block["correlations"], of_cameras=False)
 
@@ -248,7 +250,7 @@ def taken_up(block: Document, most: int) -> Iterator[Row]:
         alike = OF_POSITIONS if cause in OF_POSITIONS else set()
         rivals = dict.fromkeys(rival for row in rows for rival in row["rivals"] if rival not in alike)
         others = listed(f"another {rival}" if rival == cause else rival for rival in rivals)
-        yield "taken up", f"{text}; {others} would explain it nearly as well" if rivals else text
+        yield "cause found", f"{text}; {others} would explain it nearly as well" if rivals else text
 
 
 def _whose(row: Document) -> str:

@@ -67,7 +67,7 @@ def control(document: Document, most: int | None = None) -> Iterator[Part]:
 def given_table(document: Document, given: Rows, role: str, most: int | None) -> Table:
     """Return the table of given points of a role with their differences, the worst first."""
     summary = document["summary"]
-    shown, note = worst_first(given, "normalised", ("points", role, "control"), most)
+    shown, note = worst_first(given, "normalised", ("point", role, "control"), most)
     used = Field("use"), [_used(row) for row in shown]
     known = (size for size, out in zip(given.values("normalised"), given.values("rejected"), strict=True) if not out)
     plan, height = summary[role]["plan"], summary[role]["height"]
@@ -141,7 +141,7 @@ def check(document: Document, most: int | None = None) -> Iterator[Part]:
     points = document["points"].where(role="check")
     known, tested = ({row["id"]: row for row in rows} for rows in (points, tests["points"]))
     chances = [-_chance(tested[name]) if name in tested else -1.0 for name in given.values("id")]
-    shown, note = worst_first(given, chances, ("points", "check", "control"), most)
+    shown, note = worst_first(given, chances, ("point", "check", "control"), most)
     quantities = points.quantities | given.quantities | tests["points"].quantities
     blank = dict.fromkeys(quantities)
     rows = [blank | known.get(row["id"], {}) | row | UNTESTED | tested.get(row["id"], {}) for row in shown]
@@ -166,7 +166,7 @@ def cross_validation(document: Document, most: int | None = None) -> Iterator[Pa
     for fold in failed[:FAILED_SHOWN]:
         yield Words(f"not without {listed(fold['left_out'], IDS_NAMED)}: {fold['reason']}", "look", "-")
     if len(rows):
-        where = ("points", "cross-validation", "cross_validation")
+        where = ("point", "cross-validation", "cross_validation")
         shown, note = worst_first(rows, [-_chance(row) for row in rows], where, most)
         seen = {f"z_{part}": (block[part]["ratio"], block[part]) for part in PARTS}
         explained = most is not None and document["summary"]["check"]["plan"]["count"]  # above, at the check points
@@ -278,7 +278,7 @@ def precision(document: Document) -> Iterator[Part]:
     yield _least_precise(document["points"])
     if len(block["along"]):
         keys = "photo distance points plan height centre_plan:1 centre_height:1"
-        note = "rms of the points nearest to each photo, and its perspective centre"
+        note = "rms of the points nearest to each photo, and its perspective centre; distance: from the first photo"
         yield keyed(block["along"], f"{keys} strip:2" if len(document["strips"]) > 1 else keys, note)
 
 
@@ -300,7 +300,9 @@ def _check(check: Document | None) -> Iterator[tuple[str, str]]:
     yield "check points", f"{'; '.join(parts)} in units of their standard deviations"
     for test in check["tests"]:
         count = counted(test["coordinates"], "coordinate")
-        text = f"chi-square {fixed(test['squares'], 1)} of {count}, p = {100 * test['p']:.1f} %"
+        text = (
+            f"chi-square {fixed(test['squares'], 1)} for {count}, probability of a larger one {100 * test['p']:.1f} %"
+        )
         yield "all together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}", text
 
 
@@ -326,7 +328,7 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
             continue
         yield Facts(tuple(_summed(own, f"{unit} {decimals}")))
         lengths = [mark["length"] for mark in own]
-        shown, note = worst_first(own, lengths, ("marks", "marks", "residuals"), most)
+        shown, note = worst_first(own, lengths, ("mark", "marks", "residuals"), most)
         if len(shown) > MOST_MARKS:
             yield _by_point(own, unit, decimals)
             shown = nlargest(WORST_MARKS, own, key=itemgetter("length"))
@@ -398,7 +400,8 @@ def _summed(marks: Sequence[Document], form: str) -> Iterator[tuple[str, str]]:
 def rejected(document: Document) -> Iterator[Part]:
     rows = standing_rejections(document)
     keys = "point photo+other_photo test value limit unit reason:1"
-    yield keyed(rows, keys) if len(rows) else Words("Nothing was rejected.")
+    note = "value: of the test, beyond its limit"
+    yield keyed(rows, keys, note) if len(rows) else Words("Nothing was rejected.")
 
 
 def standing_rejections(document: Document) -> Rows:

@@ -90,7 +90,7 @@ def test_beside_an_error_it_is_said_all_the_same(wrong: dict[str, float], cause:
     """Start angles in another unit are an error; then no finding names what the adjustment went on with."""
     document = adjusted(**wrong, start_angles=TWICE_IN_RADIANS)
     assert [each["code"] for each in document["findings"]] == ["P601"]
-    assert said(document, "taken up") == [cause]
+    assert said(document, "cause found") == [cause]
     (estimated,) = said(document, "estimated")
     assert estimated.startswith(value)
     assert "(σ 0.0" in estimated
@@ -104,7 +104,7 @@ def test_what_the_project_asks_for_is_estimated_and_not_taken_up_and_the_most_si
     """Fifty strips with an offset each do not fill the page."""
     document = adjusted(east=10.0, correction="offset")
     assert document["bundle"]["taken_up"] == []
-    assert said(document, "taken up") == []
+    assert said(document, "cause found") == []
     first, second = said(document, "estimated")
     assert first.startswith("camera positions of strip A: added -9.")
     assert second.startswith("camera positions of strip B: added -")
@@ -137,7 +137,7 @@ def test_like_causes_share_a_line_and_name_what_explains_as_much() -> None:
     of_list |= dict.fromkeys(f"{name}_{axis}" for name in ("shift", "sigma") for axis in ("east", "north"))
     of_list |= {"shift_up": 0.612, "sigma_up": 0.021}
     document["bundle"]["taken_up"] = [*of_photos, of_list]
-    assert said(document, "taken up") == [
+    assert said(document, "cause found") == [
         "shift of photos 0, 1, 2 and 6 more",
         (
             "without control[1], which lies +0.612 m up (σ 0.021) beside all else; another control list would explain "
