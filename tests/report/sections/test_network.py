@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 from statistics import median
@@ -17,6 +18,7 @@ from photostrip.pipeline.run import triangulate
 from photostrip.report.html import to_html
 from photostrip.report.page.layout import to_markdown, to_text
 from photostrip.report.page.parts import Facts, Table
+from photostrip.report.sections import points
 from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Spec
@@ -184,6 +186,15 @@ def test_the_marks_of_given_points_are_shown_in_pixels(block: Document) -> None:
     assert isinstance(facts, Facts)
     rms = np.sqrt(np.mean(np.square(used))) / PIXEL_UM
     assert facts.rows[0][1].startswith(f"{len(used) // 2} marks, rms {rms:.2f} px; largest ")
+
+
+def test_many_marks_are_summed_up_point_by_point(block: Document, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(points, "MOST_MARKS", 10)
+    (section,) = chosen_sections(block, names=["marks"])
+    by_point, worst = (part for part in section.parts if isinstance(part, Table))
+    seen = block["residuals"].where(point=set(block["control"].values("id")))["point"].tolist()
+    assert {row[0]: int(row[2]) for row in by_point.rows} == Counter(seen)
+    assert f"the worst {len(worst.rows)} of {len(seen)}" in worst.note
 
 
 def test_a_mark_beside_its_point_stands_first_in_the_short_report(block: Document) -> None:
