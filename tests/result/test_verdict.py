@@ -60,9 +60,6 @@ def test_what_nothing_verifies_is_not_good(plan: int, height: int, missing: str)
     assert text.count("no point verifies") == 1
 
 
-# ------------------------------------------------------------------------------------------- the tests of the program
-
-
 def moved(points: int, metres: float, axis: int = 0, adjustment: str = "polynomial") -> Document:
     """Displace the first so many of eight check points, in turn forth and back."""
     wanted = spec("projected", 2)
@@ -210,9 +207,6 @@ def test_measurements_that_contradict_each_other_everywhere_are_no_result(noise:
     assert exit_code(document["status"], strict=False) == (status == FAILED)
     if status == FAILED:
         assert quiet(document).startswith("FAILED: the measurements contradict their stated standard deviations.")
-
-
-# ------------------------------------------------------------------------------------------------------------ pairs
 
 
 def with_pairs(sigma0: list[float], project: float, *, calibration: bool = False, given: float = 5.0) -> list[str]:

@@ -271,7 +271,7 @@ def area(outline: Floats) -> float:
 
 
 def _square(size: float) -> str:
-    return f"{size / SQUARE_KM:.3g} km²" if size >= SQUARE_KM / 10 else f"{size:.0f} m²"
+    return f"{float(f'{size / SQUARE_KM:.3g}'):g} km²" if size >= SQUARE_KM / 10 else f"{size:.0f} m²"
 
 
 def overlaps(outlines: list[Floats], rows: int = 1) -> list[list[Floats]]:

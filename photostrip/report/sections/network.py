@@ -256,7 +256,7 @@ def taken_up(block: Document, most: int) -> Iterator[Row]:
 def _whose(row: Document) -> str:
     if row["cause"] == "control list":
         known = [axis for axis in GROUND_AXES if row[f"shift_{axis}"] is not None]
-        steps = (f"{signed(row[f'shift_{axis}'])} m {axis} (σ {metres(row[f'sigma_{axis}'])})" for axis in known)
+        steps = (f"{signed(row[f'shift_{axis}'])} m {axis} (σ {metres(row[f'sigma_{axis}'])} m)" for axis in known)
         return f"{row['of']}, which lies {', '.join(steps)} beside all else"
     if row["cause"].endswith("photo"):
         return str(row["of"])
@@ -312,7 +312,7 @@ def _parameter(row: Document, pixel: float | None) -> str:
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     more = f", {short(row['value'] / pixel, 3)} px" if pixel and row["unit"] == "mm" else ""
     more += "" if row["significant"] else ", not significant"
-    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{more})"
+    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{unit}{more})"
 
 
 def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:
@@ -320,7 +320,7 @@ def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:
         own = list(corrections)
         said = []
         for kind, parts in groupby(own, key=itemgetter("kind")):
-            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])})" for r in parts)
+            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])} m)" for r in parts)
             said.append(f"from the first to the last {steps} more" if kind == "drift" else steps)
         yield f"camera positions of {group}: added {'; '.join(said)}", _largest(own, "whole", "whole_sigma")
 

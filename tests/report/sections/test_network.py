@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 from statistics import median
@@ -17,6 +18,7 @@ from photostrip.pipeline.run import triangulate
 from photostrip.report.html import to_html
 from photostrip.report.page.layout import to_markdown, to_text
 from photostrip.report.page.parts import Facts, Table
+from photostrip.report.sections import points
 from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Spec
@@ -140,8 +142,8 @@ def test_like_causes_share_a_line_and_name_what_explains_as_much() -> None:
     assert said(document, "cause found") == [
         "shift of photos 0, 1, 2 and 6 more",
         (
-            "without control[1], which lies +0.612 m up (σ 0.021) beside all else; another control list would explain "
-            "it nearly as well"
+            "without control[1], which lies +0.612 m up (σ 0.021 m) beside all else; another control list would "
+            "explain it nearly as well"
         ),
     ]
 
@@ -186,6 +188,15 @@ def test_the_marks_of_given_points_are_shown_in_pixels(block: Document) -> None:
     assert facts.rows[0][1].startswith(f"{len(used) // 2} marks, rms {rms:.2f} px; largest ")
 
 
+def test_many_marks_are_summed_up_point_by_point(block: Document, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(points, "MOST_MARKS", 10)
+    (section,) = chosen_sections(block, names=["marks"])
+    by_point, worst = (part for part in section.parts if isinstance(part, Table))
+    seen = block["residuals"].where(point=set(block["control"].values("id")))["point"].tolist()
+    assert {row[0]: int(row[2]) for row in by_point.rows} == Counter(seen)
+    assert f"the worst {len(worst.rows)} of {len(seen)}" in worst.note
+
+
 def test_a_mark_beside_its_point_stands_first_in_the_short_report(block: Document) -> None:
     (section,) = (each for each in chosen_sections(block, width=100) if each.title == "Marks of given points")
     (table,) = (part for part in section.parts if isinstance(part, Table))
@@ -214,7 +225,7 @@ def test_the_ground_that_a_pixel_covers_is_that_of_depth_and_principal_distance(
 def test_the_estimated_camera_has_pixels_significance_and_correlations(block: Document) -> None:
     rows = {row["parameter"]: row for row in block["bundle"]["calibration"]}
     distance, k1 = rows["principal_distance"], rows["k1"]
-    camera, said = block["cameras"][0], printed(block)
+    camera, said = block["cameras"][0], " ".join(printed(block).split())
     assert distance["given"] == camera["principal_distance_mm"]
     assert distance["adjusted"] == pytest.approx(distance["given"] + distance["value"], abs=1e-6)
     corner = np.hypot(*(np.array(camera["format_mm"]) / 2 + np.abs(camera["principal_point_mm"]))) * 1000.0
