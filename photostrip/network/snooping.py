@@ -15,6 +15,7 @@ from functools import cached_property, partial, reduce
 from math import comb, log
 
 import numpy as np
+from scipy.special import xlogy
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
@@ -139,7 +140,7 @@ def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> floa
     given_out = sum(each.kind != IMAGE and not each.readmitted for each in done.rejections)
     asked = rays_out, given_out, photos, len(done.common) - photos
     numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
-    price = sum(count * 2.0 * np.log(number / level) for count, number in zip(asked, numbers, strict=True))
+    price = 2.0 * xlogy(asked, np.array(numbers) / level).sum()  # of nothing that is asked of nothing: 0
     return float(done.solution.chi_square / unit**2 + price)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import defects, hypotheses, reliability, snooping
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
@@ -97,7 +98,7 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
     test = bundle.sigma0
     if np.isfinite(test.lower) and not test.passed:
         text = (
-            f"sigma0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} "
+            f"σ0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} "
             f"and {test.upper:.3f}: they are too {'small' if test.sigma0 > 1 else 'large'}"
         )
         yield Note("unit-weight", text, severity="note")
@@ -126,7 +127,7 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
     """Name control and camera positions that contradict the rest, whether they were taken out or had to stay."""
     problem = bundle.block.problem
     early = "found in its strip" if bundle.start.strips else "found before the adjustment"
-    for each in bundle.screened.rejections:
+    for each in sorted(bundle.screened.rejections, key=lambda each: -abs(each.worst)):
         if not each.readmitted and each.kind != reliability.IMAGE:
             text, photos, points = _contradiction(problem, each, early)
             text += "; not used"
@@ -143,7 +144,7 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
 
 def _contradiction(problem: BundleProblem, each: Rejection, early: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Say how far a given coordinate is off; of which photo or point it is. ``early``: where no test found it."""
-    axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
+    axis = GROUND_AXES[each.axes[0]]
     reached = early
     if np.isfinite(each.value):
         reached = f"test value {each.value:.2f}, limit {each.limit:.2f}"

@@ -43,8 +43,10 @@ def batch_html(outcomes: Sequence[Document], version: str) -> str:
     return _page("Batch", version, _sections(named, batch_maps(outcomes)))
 
 
-def sections_html(title: str, version: str, sections: Iterable[Section]) -> str:
-    return _page(title, version, _sections([("", section) for section in sections], []))
+def sections_html(title: str, version: str, sections: Iterable[Section], pictures: Sequence[Picture] = ()) -> str:
+    """Return sections as a page; pictures stand behind those that have no title."""
+    named = [("" if section.title else FOREMOST[0], section) for section in sections]
+    return _page(title, version, _sections(named, pictures))
 
 
 def _page(title: str, version: str, sections: list[Document]) -> str:

@@ -33,7 +33,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     taken_out, said = rejected.rejected_of(result), (*notes, *result.notes)
     counts = summary.counts_of(result, sum(len(image.rows) for image in images))
     table = points.points_of(result, points.point_rms(result, images), rank)
-    unchecked = points.unchecked_notes(table, taken_out, counts["image_points"])
+    unchecked = points.unchecked_notes(table, taken_out)
     lost = rejected.lost_say_notes(result, images, taken_out, said)
     body: Document = {
         "adjustment": summary.adjustment_of(result),

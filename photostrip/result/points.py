@@ -90,14 +90,14 @@ def counts_of(points: Table) -> Document:
     return {"points_checked": {name: number[name] for name in reversed(CHECKED)}}
 
 
-def unchecked_notes(points: Table, rejected: Table, measured: int) -> Iterator[Note]:
+def unchecked_notes(points: Table, rejected: Table) -> Iterator[Note]:
     """Say what may be left in points that nothing checks along the base, where as many rays were found wrong.
 
     rejected: the table ``rejected`` of the document.
-    measured: number of all image points.
     """
-    wrong = {each["point"] for each in rejected if each["photo"] is not None and not each["readmitted"]}
-    share, number = len(wrong) / max(measured, 1), counts_of(points)["points_checked"]
+    gone = [each["point"] for each in rejected if each["photo"] is not None and not each["readmitted"]]
+    wrong, tested = set(gone), int(points["rays"].sum()) + len(gone)
+    share, number = len(wrong) / max(tested, 1), counts_of(points)["points_checked"]
     if share * points["rays"][points["checked"] != ALONG].sum() < 1.0:
         return
     text = (

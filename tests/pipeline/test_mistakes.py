@@ -225,16 +225,19 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize(
-    ("make", "seed", "search_cameras"), [(planted.sound, 43003, False), (planted.block, 43001, True)]
+    ("make", "seed", "search_cameras", "free"),
+    [(planted.sound, 43003, False, False), (planted.block, 43001, True, False), (planted.sound, 43003, False, True)],
 )
 def test_a_shifted_photo_is_named_with_its_shift(
-    make: Callable[[int], planted.Case], seed: int, *, search_cameras: bool
+    make: Callable[[int], planted.Case], seed: int, *, search_cameras: bool, free: bool
 ) -> None:
-    """Whatever is said of the calibration of its camera (`self_calibration: never`)."""
+    """Whatever is said of the calibration of its camera (`self_calibration: never`), and where nothing is given."""
     case = make(seed)
     inputs, ids = planted_in(case, "one photo shifted by 5 mm")
+    inputs = replace(inputs, control=inputs.control.take(np.zeros(0, np.intp))) if free else inputs
     shift = (inputs.observations.xy - case.inputs.observations.xy)[case.shows(*ids)][0]
-    settings = replace(case.settings, bundle=replace(case.settings.bundle, search_cameras=search_cameras))
+    bundle = replace(case.settings.bundle, search_cameras=search_cameras)
+    settings = replace(case.settings, adjustment="bundle", bundle=bundle)
     (finding,) = (each for each in triangulate(inputs, settings).findings if each.code == "P109")
     assert set(finding.photos) == ids
     found = [float(finding.evidence[f"shift_{axis}_mm"]) for axis in "xy"]

@@ -488,19 +488,6 @@ def test_the_order_of_the_rows_does_not_matter() -> None:
                 assert x == (pytest.approx(y, abs=1e-3, rel=1e-3) if isinstance(y, float) else y)
 
 
-def test_points_without_coordinates_are_named_with_the_reason() -> None:
-    inputs = case("local").inputs
-    o = inputs.observations
-    xy, sigma = np.vstack([o.xy, [10.0, 10.0]]), np.vstack([o.sigma, [0.005, 0.005]])
-    photo, point = np.append(o.photo, 0), np.append(o.point, len(o.point_ids))
-    once = replace(o, point_ids=(*o.point_ids, "lonely"), photo=photo, point=point, xy=xy, sigma=sigma)
-    document = solved(replace(inputs, observations=once)).document
-    assert {"id": "lonely", "reason": "measured on one photo only"} in document["not_determined"]
-    assert "lonely" not in {row["id"] for row in document["points"]}
-    (ray,) = document["residuals"].where(point="lonely")
-    assert (ray["vx_um"], ray["vy_um"], ray["used"]) == (None, None, False)
-
-
 def test_notes_of_the_reading_come_first() -> None:
     note = Note("hint", "something about a file", severity="note", points=("A",))
     document = document_of(case("local").result, [note])

@@ -97,7 +97,7 @@ def lines_of(findings: Sequence[Document]) -> list[str]:
         elif told[kind] == count[kind]:
             more = count[kind] - MOST_OF_A_KIND
             place = f"{each['file']}: " if kind[2:] and each["file"] else ""
-            lines.append(visible(f"{kind[0]}: {place}{kind[1]} {more} more like these; --format json names all"))
+            lines.append(visible(f"{kind[0]}: {place}{kind[1]} {more} more of this kind; --format json names all"))
     return lines
 
 

@@ -266,7 +266,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
         "zone the mean of all pairs and the scatter of one point: a mean off zero in all pairs alike tells of the "
         "camera, not of the pairs."
     )
-    beyond = int((np.abs(size) > limit)[used | (len(rows) <= MOST_POINTS)].sum())
+    beyond = int((np.abs(size) > limit)[~used | (len(rows) <= MOST_POINTS)].sum())
     if beyond:
         caption += f" At the ends of the axis {counted(beyond, 'parallax', 'parallaxes')} beyond it."
     if len(borders):

@@ -93,7 +93,7 @@ def stages(document: Document, most: int) -> Iterator[Row]:
             for key, what in (("control_rms", "control"), ("check_rms", "check points"))
             if classical[key]["plan"] is not None or classical[key]["height"] is not None
         ]
-        yield "polynomials instead", f"{degrees(classical['strips'])}; rms in plan/height {', '.join(left)}"
+        yield "by polynomials", f"{degrees(classical['strips'])}; rms in plan/height {', '.join(left)}"
 
 
 def _verdict(test: Document) -> str:
@@ -175,7 +175,9 @@ def shared_parameters(document: Document) -> Iterator[Part]:
     if shared := tuple(taken_up(block, NAMED)):
         yield Facts(shared)
     if len(block["corrections"]):
-        note = "added to the given positions of a strip; a drift is per unit of time"
+        note = (
+            "added to the given positions of a strip; a drift from photo to photo, or for each unit of the given times"
+        )
         yield keyed(block["corrections"], "name value sigma", note)
     yield from _highly_correlated(block["correlations"], of_cameras=False)
 
@@ -256,13 +258,13 @@ def taken_up(block: Document, most: int) -> Iterator[Row]:
         alike = OF_POSITIONS if cause in OF_POSITIONS else set()
         rivals = dict.fromkeys(rival for row in rows for rival in row["rivals"] if rival not in alike)
         others = listed(f"another {rival}" if rival == cause else rival for rival in rivals)
-        yield "taken up", f"{text}; {others} would explain it nearly as well" if rivals else text
+        yield "cause found", f"{text}; {others} would explain it nearly as well" if rivals else text
 
 
 def _whose(row: Document) -> str:
     if row["cause"] == "control list":
         known = [axis for axis in GROUND_AXES if row[f"shift_{axis}"] is not None]
-        steps = (f"{signed(row[f'shift_{axis}'])} m {axis} (σ {metres(row[f'sigma_{axis}'])})" for axis in known)
+        steps = (f"{signed(row[f'shift_{axis}'])} m {axis} (σ {metres(row[f'sigma_{axis}'])} m)" for axis in known)
         return f"{row['of']}, which lies {', '.join(steps)} beside all else"
     if row["cause"].endswith("photo"):
         return str(row["of"])
@@ -318,7 +320,7 @@ def _parameter(row: Document, pixel: float | None) -> str:
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     more = f", {short(row['value'] / pixel, 3)} px" if pixel and row["unit"] == "mm" else ""
     more += "" if row["significant"] else ", not significant"
-    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{more})"
+    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{unit}{more})"
 
 
 def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:
@@ -326,7 +328,7 @@ def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:
         own = list(corrections)
         said = []
         for kind, parts in groupby(own, key=itemgetter("kind")):
-            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])})" for r in parts)
+            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])} m)" for r in parts)
             said.append(f"from the first to the last {steps} more" if kind == "drift" else steps)
         yield f"camera positions of {group}: added {'; '.join(said)}", _largest(own, "whole", "whole_sigma")
 
