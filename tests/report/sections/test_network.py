@@ -142,8 +142,8 @@ def test_like_causes_share_a_line_and_name_what_explains_as_much() -> None:
     assert said(document, "cause found") == [
         "shift of photos 0, 1, 2 and 6 more",
         (
-            "without control[1], which lies +0.612 m up (σ 0.021) beside all else; another control list would explain "
-            "it nearly as well"
+            "without control[1], which lies +0.612 m up (σ 0.021 m) beside all else; another control list would "
+            "explain it nearly as well"
         ),
     ]
 
@@ -225,7 +225,7 @@ def test_the_ground_that_a_pixel_covers_is_that_of_depth_and_principal_distance(
 def test_the_estimated_camera_has_pixels_significance_and_correlations(block: Document) -> None:
     rows = {row["parameter"]: row for row in block["bundle"]["calibration"]}
     distance, k1 = rows["principal_distance"], rows["k1"]
-    camera, said = block["cameras"][0], printed(block)
+    camera, said = block["cameras"][0], " ".join(printed(block).split())
     assert distance["given"] == camera["principal_distance_mm"]
     assert distance["adjusted"] == pytest.approx(distance["given"] + distance["value"], abs=1e-6)
     corner = np.hypot(*(np.array(camera["format_mm"]) / 2 + np.abs(camera["principal_point_mm"]))) * 1000.0
