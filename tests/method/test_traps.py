@@ -95,23 +95,26 @@ def with_rows(inputs: Inputs, rows: list[tuple[str, str, float, float]]) -> Inpu
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
-def test_points_seen_once_are_listed_and_change_nothing(adjustment: str) -> None:
+@pytest.mark.parametrize(
+    ("adjustment", "apart"),
+    [("polynomial", "not on two neighbouring photos of one strip"), ("bundle", "rays contradict each other")],
+)
+def test_points_seen_once_are_listed_and_change_nothing(adjustment: str, apart: str) -> None:
     """As many as would loosen the test of gross errors, if they counted as found wrong."""
     inputs = inputs_of(simulate(Spec(seed=3, gross_errors=(GrossError("image", count=3, size_um=70.0),))))
     photos, random = inputs.strips[0].photos, np.random.default_rng(1)
+    inputs = with_rows(inputs, [(photos[3], "apart", 60.0, 10.0), (photos[5], "apart", -60.0, -30.0)])
     once = [(photo, f"S{n}", *random.uniform(-90.0, 90.0, 2).tolist()) for n, photo in enumerate(photos * 10)]
+    before, after = (triangulate(each, Settings(adjustment=adjustment)) for each in (inputs, with_rows(inputs, once)))
+    assert before.not_determined["apart"] == apart
     reasons = {point: "measured on one photo only" for _, point, _, _ in once}
-    if adjustment == "polynomial":  # a bundle takes points of any two photos
-        once += [(photos[3], "apart", 60.0, 10.0), (photos[5], "apart", -60.0, 10.0)]
-        reasons["apart"] = "not on two neighbouring photos of one strip"
-    settings = Settings(adjustment=adjustment)
-    before, after = triangulate(inputs, settings), triangulate(with_rows(inputs, once), settings)
     assert after.not_determined == before.not_determined | reasons
     np.testing.assert_array_equal(before.points.number, after.points.number)
     a, b = (document_of(result) for result in (before, after))
     assert {key for key in a if a[key] != b[key]} == {"counts", "not_determined", "residuals"}
     assert a["counts"] | {key: b["counts"][key] for key in ("image_points", "not_determined")} == b["counts"]
+    (ray,) = b["residuals"].where(point="S7")
+    assert (ray["vx_um"], ray["vy_um"], ray["used"]) == (None, None, False)
 
 
 @pytest.mark.parametrize(("kappa", "across"), [(0.0, False), (31.0, False), (90.0, False), (0.0, True)])

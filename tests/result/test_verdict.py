@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from photostrip.foreign.adjusted import adjusted
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.report.page.layout import to_text
@@ -264,6 +265,7 @@ def test_a_photo_that_is_shifted_as_a_whole_is_named_and_loses_no_points(shift: 
     assert verdict["status"] == LOOK
     assert [text[:40] for text in verdict["look_at"]] == ["P109 all image coordinates of photo 1005"]
     assert [each for each in document["rejected"] if not each["readmitted"]] == []
+    assert [*adjusted(document).cameras] == ["film", "film of photo 1005"]  # exported with a camera of its own
 
 
 def test_photos_with_large_residuals_come_before_those_that_lost_points_worst_first() -> None:
