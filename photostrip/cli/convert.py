@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from photostrip.foreign.tables import ForeignBlock, Wanted
 
 RESULT = "result.json"
+OR_FORCE = "choose another folder, or use --force"
 
 
 def convert(
@@ -139,7 +140,7 @@ def _written_for_others(source: Path, target: str, form: str, *, force: bool) ->
         fault = Fault(message, "result-incomplete", str(file), expected="a whole result.json", fix=FIX)
         raise InputError(fault) from error
     if not force and (form == "opensfm" or any("/" in name for name in found.files)):  # measurements may stand there
-        refuse_existing(place.parent, list(found.files))
+        refuse_existing(place.parent, list(found.files), OR_FORCE)
     write_files(place.parent, found.files, [file, *(file.parent / f"{name}.csv" for name in TABLES)])
     return [*([f"{file}: {EDITED}"] if is_edited(saved) else []), *found.said]
 
@@ -175,7 +176,7 @@ def _converted(source: Path, output: Path, options: Mapping[str, Any], *, force:
         raise InputError(Fault(message, "no-points", str(source), key="--control", fix=fix))
     files = project_files(output.resolve().name or "project", block, wanted)
     if not force:
-        refuse_existing(output, list(files))
+        refuse_existing(output, list(files), OR_FORCE)
     write_files(output, files, block.files)
     said = understood(block, wanted)
     width = max(map(len, said))

@@ -97,7 +97,7 @@ def deliver(
         if draw is not None and output.suffix.lower() == PICTURE:
             write_text(output, draw(sheet.document()).file())
         else:
-            write_text(output, sheet.rendered(form_of(output, "-o", SHEET_FORMS)))
+            write_text(output, sheet.rendered(form_of(output, "-o", SHEET_FORMS), draw=draw))
         if quiet:
             return
     if form == "json":

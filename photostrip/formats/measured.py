@@ -213,7 +213,8 @@ def _spread(read: Measurements, target: str, off: Floats, count: Numbers) -> Not
     message = (
         f"{counted(int(several.sum()), target)} measured up to {count.max()} times on a photo, the mean is used; one"
         f" measurement scatters by {scatter[0]:.3g} in x and {scatter[1]:.3g} in y (standard deviations, unit of the"
-        f" table), the worst is {target} {name} on photo {photo}, {np.abs(off[worst]).max():.3g} off its mean"
+        f" table), the worst is {target} {name} on photo {photo}, {np.abs(off[worst]).max():.3g} beside the mean of "
+        "its measurements"
     )
     line, file = int(read.table.lines[worst]), read.table.file_of(worst)
     return Note("measurements-averaged", message, "note", photos=(photo,), points=(name,), file=file, line=line)

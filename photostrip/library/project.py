@@ -136,8 +136,8 @@ def load(
 
     project: the project file; or its content as a mapping, with tables in memory where files are named: data frames,
         structured arrays, or mappings of names of columns to values.
-    overrides: keys with other values than the project has, ``processing={"adjustment": "bundle"}``; of a mapping data
-        frames of its blocks, too: ``observations=frame, control=frame``, of several lists ``control=[one, other]``.
+    overrides: keys with other values than the project has, ``processing={"adjustment": "bundle"}``; of a mapping
+        the tables of its blocks, too: ``observations=frame, control=frame``, of several lists ``control=[one, other]``.
     Raises InputError with every fault of every file.
     """
     path, source, rest = place_of(project, "project", overrides)

@@ -350,21 +350,24 @@ class Selection:
         return bool(flags[row] if kind == "image" else flags[row, axis])
 
 
-def supported(problem: BundleProblem, selection: Selection) -> Selection:
-    """Take out the rays of points that too few rays are left of.
-
-    These are points with one ray that are not given in all three coordinates, and control that no ray is left of.
-    """
+def placeable(problem: BundleProblem, selection: Selection) -> Flags:
+    """Rays (n,) of points with enough rays, or with three given coordinates: others place no point, nor check one."""
     point = problem.images.point
     rays = np.bincount(point[selection.images], minlength=problem.points)
     control = selection.control & np.isfinite(problem.control.sigma)
-    fixed = np.zeros(problem.points, bool)
-    fixed[problem.control.point[control.all(axis=1)]] = True
-    images = selection.images & ((rays >= problem.least) | fixed)[point]
-    images &= np.isfinite(problem.start.points[point]).all(axis=1)
+    given = np.zeros(problem.points, bool)
+    given[problem.control.point[control.all(axis=1)]] = True
+    return np.asarray(selection.images & ((rays >= problem.least) | given)[point], bool)
+
+
+def supported(problem: BundleProblem, selection: Selection) -> Selection:
+    """Take out the rays of points that too few rays are left of, and control that no ray is left of."""
+    point = problem.images.point
+    images = placeable(problem, selection) & np.isfinite(problem.start.points[point]).all(axis=1)
     shown = np.zeros(problem.points, bool)
     shown[point[images]] = True
-    return replace(selection, images=images, control=control & shown[problem.control.point][:, None])
+    control = selection.control & np.isfinite(problem.control.sigma) & shown[problem.control.point][:, None]
+    return replace(selection, images=images, control=control)
 
 
 def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:

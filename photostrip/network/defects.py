@@ -187,8 +187,9 @@ def weak(prepared: PreparedProblem, state: Parameters) -> str:
         metres, move = held.weakest
         if metres > GROWN * held.sigma:
             return (
-                f"what is given hardly determines {_moves(state, held, move[:, None])}: the points move by "
-                f"{metres:.2g} m (standard deviation, rms) with it, and a given coordinate has {held.sigma:.2g} m"
+                f"what is given hardly determines {_moves(state, held, move[:, None])} of the whole: by that alone the "
+                f"points are uncertain by {metres:.2g} m (standard deviation, rms), where a given coordinate has "
+                f"{held.sigma:.2g} m; more control, farther apart, holds it"
             )
     return ""
 

@@ -15,6 +15,7 @@ from functools import cached_property, partial, reduce
 from math import comb, log
 
 import numpy as np
+from scipy.special import xlogy
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
@@ -46,6 +47,7 @@ from photostrip.network.testing import (
 )
 from photostrip.points import take_rows
 from photostrip.rejection import Rejection
+from photostrip.statistics import TEST_LEVEL
 from photostrip.strip.control_screening import LARGEST_SHARE
 from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
 
@@ -69,6 +71,7 @@ class ScreenedBundle:
     common: tuple[Hypothesis, ...] = ()  # what groups of observations share, taken up as unknowns
     # given coordinates beyond the limit that stay: without them the adjustment fails, or half of the control would go
     held: tuple[Rejection, ...] = ()
+    doubted: tuple[Rejection, ...] = ()  # others, that are beyond it by the stated standard deviations
 
     @classmethod
     def of(
@@ -137,7 +140,7 @@ def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> floa
     given_out = sum(each.kind != IMAGE and not each.readmitted for each in done.rejections)
     asked = rays_out, given_out, photos, len(done.common) - photos
     numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
-    price = sum(count * 2.0 * np.log(number / level) for count, number in zip(asked, numbers, strict=True))
+    price = 2.0 * xlogy(asked, np.array(numbers) / level).sum()  # of nothing that is asked of nothing: 0
     return float(done.solution.chi_square / unit**2 + price)
 
 
@@ -155,7 +158,7 @@ def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
         done = search.clean(supported(search.problem, less))
     done = search.with_most_control(done)
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
-    done = replace(done, rejections=tuple(search.log(done)), held=held)
+    done = replace(done, rejections=tuple(search.log(done)), held=held, doubted=search.doubted(done))
     return replace(done, rounds=search.rounds, common=tuple(search.common))
 
 
@@ -565,6 +568,16 @@ class _Search:
                 for row, axis in np.argwhere(value > limit.given).tolist()
             ]
         return rays, sorted(given, key=lambda each: -each.value)
+
+    def doubted(self, done: ScreenedBundle) -> tuple[Rejection, ...]:
+        """Given coordinates that only the sigma0 found keeps within the limit, where it is not far from what is stated.
+
+        A wrong one enlarges sigma0, which hides it.
+        """
+        if self.rough or done.limit.unit == 1.0 or not reliability.sigma0_test(done.solution, TEST_LEVEL).passed:
+            return ()
+        by_stated = replace(done, limit=done.limit._replace(unit=1.0))
+        return tuple(each for each in self.tested(by_stated)[1] if not self.holds(each))
 
     def holds(self, given: Rejection) -> bool:
         return (given.kind, given.row, given.axes[0]) in self.held

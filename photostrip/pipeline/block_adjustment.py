@@ -15,6 +15,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import defects, hypotheses, reliability, snooping
 from photostrip.network.adjustment import BundleSolution, Cofactors, Selection, restarted, selected, solve, supported
@@ -97,7 +98,7 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
     test = bundle.sigma0
     if np.isfinite(test.lower) and not test.passed:
         text = (
-            f"sigma0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} "
+            f"σ0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} "
             f"and {test.upper:.3f}: they are too {'small' if test.sigma0 > 1 else 'large'}"
         )
         yield Note("unit-weight", text, severity="note")
@@ -126,20 +127,24 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
     """Name control and camera positions that contradict the rest, whether they were taken out or had to stay."""
     problem = bundle.block.problem
     early = "found in its strip" if bundle.start.strips else "found before the adjustment"
-    for each in bundle.screened.rejections:
+    for each in sorted(bundle.screened.rejections, key=lambda each: -abs(each.worst)):
         if not each.readmitted and each.kind != reliability.IMAGE:
             text, photos, points = _contradiction(problem, each, early)
             text += "; not used"
             yield Note("control-rejected" if points else "position-rejected", text, photos=photos, points=points)
-    for each in bundle.screened.held:
+    screened, unit = bundle.screened, bundle.screened.limit.unit
+    why = "without it the adjustment fails, or half of the control would be out"
+    kept = [(each, why) for each in screened.held]
+    kept += [(each, f"by the sigma0 found the test value is {each.value / unit:.2f}") for each in screened.doubted]
+    for each, why in kept:
         text, photos, points = _contradiction(problem, each, early)
-        text += "; it was used: without it the adjustment fails, or half of the control would be out"
+        text += f"; it was used: {why}"
         yield Note("control-doubtful" if points else "position-doubtful", text, photos=photos, points=points)
 
 
 def _contradiction(problem: BundleProblem, each: Rejection, early: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Say how far a given coordinate is off; of which photo or point it is. ``early``: where no test found it."""
-    axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
+    axis = GROUND_AXES[each.axes[0]]
     reached = early
     if np.isfinite(each.value):
         reached = f"test value {each.value:.2f}, limit {each.limit:.2f}"
@@ -203,7 +208,7 @@ def _in_one_network(
 
 def _calibrated(observations: PhotoPoints, bundle: Bundle) -> PhotoPoints:
     """Image coordinates with the calibration that was found."""
-    problem = bundle.block.problem
+    problem = bundle.screened.problem  # with the cameras that the last search has freed
     if not len(bundle.screened.solution.common):
         return observations
     photo = bundle.start.rows_of(observations.photo_ids)[observations.photo]
@@ -234,9 +239,10 @@ def _strip(
     models = np.where(known, formed.model_count[at], 0)
     shape = np.where(known[:, None], formed.xyz[at], np.nan)
     control_at = np.searchsorted(number, formed.point[strip.control_rows])
-    at_rows = np.searchsorted(number, observations.point[rows])
     oriented = strip.of_photos.strip.oriented(centers, rotations)
-    resection = of_known_photos(observations.xy, xyz, position[rows], oriented, rows, at_rows)
+    residuals = np.empty_like(observations.xy)
+    residuals[used] = solution.image_residuals
+    resection = of_known_photos(residuals[rows], position[rows], oriented)
     return replace(
         strip,
         control_rows=np.minimum(control_at, len(number) - 1),
@@ -602,7 +608,10 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
 
 
 def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
-    """Estimate variance components, then search for gross errors once more with the standard deviations found."""
+    """Estimate variance components, then search for gross errors once more with the standard deviations found.
+
+    That search may take up more of what observations share: the result is that of all that was taken up.
+    """
     found: tuple[reliability.Component, ...] = ()
     block, screened = before.block, before.screened
     problem, level, done = block.problem, block.level, screened
@@ -617,9 +626,12 @@ def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
         done = snooping.screen_bundle(chosen, screened.selection, quiet)
     block = replace(block, problem=problem)
     final = snooping.screen_bundle(problem, screened.selection, settings.bundle, block.kept)
+    for shared in final.common:
+        block = replace(block, problem=taken_up(block.problem, shared))
     known = {(each.kind, each.row) for each in screened.rejections}
     again = (each for each in final.rejections if (each.kind, each.row) not in known)
-    final = replace(final, rejections=(*screened.rejections, *again), common=screened.common)
+    common = *screened.common, *final.common
+    final = replace(final, rejections=(*screened.rejections, *again), common=common)
     return before._replace(block=block, screened=final, components=found)
 
 

@@ -19,7 +19,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity
-from photostrip.network.adjustment import Selection
+from photostrip.network.adjustment import Selection, placeable
 from photostrip.network.problem import (
     ASKED,
     AttitudeObservations,
@@ -92,6 +92,8 @@ def build(
         group_ids=tuple(dict.fromkeys(_groups(inputs))),
         position_axes=CARTESIAN_AXES if geocentric else GROUND_AXES,
     )
+    placing = placeable(problem, Selection.everything(problem))  # what one photo alone shows is told, and tests nothing
+    rows, problem = rows[placing], replace(problem, images=images.take(placing))
     return BlockProblem(
         problem=problem,
         origin=origin,

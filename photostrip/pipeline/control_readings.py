@@ -15,21 +15,21 @@ from typing import NamedTuple
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import collinearity
 from photostrip.network.hypotheses import HEIGHTS_ONLY
-from photostrip.notes import Finding
+from photostrip.notes import Finding, listed
 from photostrip.pipeline import evidence
 from photostrip.pipeline.evidence import HeldStrip, OnControl
 from photostrip.pipeline.formed_photos import FormedPhotos
-from photostrip.pipeline.inputs import Settings, Strip
+from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.shared_errors import FIX, other_distance, shifted_list
 from photostrip.plausibility import found
 from photostrip.plausibility.finding import Evidence
 from photostrip.plausibility.given_points import LIMIT, ShiftedList, StretchedHeights, find_shared
-from photostrip.plausibility.units import FOOT, KINDS_OF_FEET
-from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.plausibility.units import FOOT, KINDS_OF_FEET, REACH_SHARE
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
 from photostrip.strip.control_screening import ROUNDING
 
@@ -38,7 +38,6 @@ SEARCH_LEVEL = 0.01  # of taking anything out of sound control
 AS_IT_IS = (0, 1, 2)
 HEIGHTS, ALL = "heights", "all"
 UNITS = "bring heights and plan into one unit, or name a crs with the right unit of height"
-COLUMNS = "put `control.axes` into the order of the columns"
 HEIGHT = 2
 DISTANCES = np.log(10.0) * np.linspace(-1.0, 1.0, 9)  # logarithms of factors, each 1.78 times the one before
 UNIT_FACTOR = 5.0  # a principal distance off by more may be right, and the decimal point of the image coordinates wrong
@@ -62,6 +61,12 @@ class Reading:
     of_list: bool = False  # whether one list is read so, and not all of them
     without: str = ""  # coordinates that lie beside the others: ``HEIGHTS`` of a list, or ``ALL``
     distance: float = 1.0  # by which the principal distance is multiplied
+    mirrored: bool = False  # whether it is the strip that is read otherwise: as the mirror image of itself
+
+    @property
+    def turns(self) -> bool:
+        """Whether it says which way is up, or is a mirror image: then the photos must look down upon the ground."""
+        return self.mirrored or self.order != AS_IT_IS or min(self.factor) < 0
 
     def __call__(self, control: ControlPoints, number: int | None = None) -> ControlPoints:
         """Read all given points, or those of one list."""
@@ -89,9 +94,10 @@ class Reading:
         return result
 
 
-def _columns(*order: int) -> Reading:
+def _columns(*order: int, of_list: bool = False) -> Reading:
     names = ", ".join(GROUND_AXES[each] for each in order)
-    return Reading("P401", f"what is called east, north, up is {names}", COLUMNS, order=(order[0], order[1], order[2]))
+    text = f"what is called east, north, up is {names}"
+    return Reading("P401", text, "", order=(order[0], order[1], order[2]), of_list=of_list)
 
 
 def _heights(factor: float, text: str) -> Reading:
@@ -100,11 +106,12 @@ def _heights(factor: float, text: str) -> Reading:
 
 AS_GIVEN = Reading("", "", "")
 DISTANCE = Reading("P105", "", "", distance=np.nan)  # which is estimated
-MIRRORED = Reading("P401", "the control is left-handed: its axes are exchanged or one of them counts backwards",
-                   f"{COLUMNS}, [north, east, up] where x points north", factor=(1.0, -1.0, 1.0))  # fmt: skip
+MIRRORED = Reading("P401", "", "", mirrored=True)  # of several causes, which fit alike
+EXCHANGED = (1, 0, 2)  # columns of the plan
 READINGS = (
     MIRRORED,
-    _columns(1, 0, 2),
+    _columns(*EXCHANGED),  # which degrees, and places with another map scale, tell from a mirror image
+    _columns(*EXCHANGED, of_list=True),
     _columns(2, 1, 0),
     _columns(0, 2, 1),
     _columns(1, 2, 0),
@@ -159,24 +166,39 @@ def find_reading(
         least = _cost(as_given, AS_GIVEN) - price
     for reading, number in ways:
         aside = reading.beside(control, number)
-        if reading.without and not aside[held.given].any():
-            continue
-        if reading.code == "P405" and as_given is not None and not _tells(as_given, reading.factor[HEIGHT]):
-            continue
-        if reading is DISTANCE and (best is not None or (as_given is not None and as_given.fits)):
+        if not _is_asked(reading, best, as_given) or (reading.without and not aside[held.given].any()):
             continue
         way, unknowns = reading, int(aside[held.given].any(axis=0).sum())
         if reading is DISTANCE:
             factor, tried = _best_distance(held, control, frames, closely=_stretched(as_given))
             way, unknowns = replace(reading, distance=factor), 1
         else:
-            tried = held.read(reading(control, number), frames, aside)
-        if tried is None or not tried.fits:
+            strip = held.mirrored if reading.mirrored else held
+            tried = strip.read(reading(control, number), frames, aside)
+        if tried is None or not tried.fits or (reading.turns and not _stands(reading, tried)):
             continue
         cost = _cost(tried, way, unknowns, number)
         if cost < least - ALIKE:
             best, least = Better(reading=way, number=number, laid=tried), cost
     return best
+
+
+def _is_asked(reading: Reading, best: Better | None, as_given: OnControl | None) -> bool:
+    """Whether a reading could explain what another does not: that found before, or the control as it is given."""
+    if reading is DISTANCE:
+        return best is None and (as_given is None or not as_given.fits)
+    if reading.code == "P405":
+        return as_given is None or _tells(as_given, reading.factor[HEIGHT])
+    return best is None or not (best.reading.mirrored and reading.order == EXCHANGED)
+
+
+def _stands(reading: Reading, laid: OnControl) -> bool:
+    """Whether the photos look down upon the ground under a reading that turns the control.
+
+    All orders of the axes of one hand are one movement, so that a strip fits under each of them alike. Models without
+    perspective centres do not know which way is up, and prove no column of heights.
+    """
+    return laid.looks_down or (laid.looks_down is None and reading.order == AS_IT_IS)
 
 
 def _best_distance(
@@ -251,8 +273,11 @@ def _cost(laid: OnControl, reading: Reading, unknowns: int = 0, number: int | No
     return float(laid.left.squares / 2.0 + size / 2.0 - np.log(factor).sum() + each * unknown)
 
 
-def named(better: Better, as_given: OnControl | None, held: HeldStrip, *, axes_are_right: bool | None) -> Finding:
-    """Name the reading under which a strip fits its control (P103, P105, P401, P403, P404, P405, P407, P409)."""
+def named(better: Better, as_given: OnControl | None, held: HeldStrip, frames: Sequence[GroundFrame]) -> Finding:
+    """Name the reading under which a strip fits its control (P105, P401, P403, P404, P405, P407, P409).
+
+    frames: those in which it is given.
+    """
     reading, number, tried = better
     strip = held.stage.strip.id
     if reading.without:
@@ -267,18 +292,81 @@ def named(better: Better, as_given: OnControl | None, held: HeldStrip, *, axes_a
     head = f"strip {strip} {before}, and {_size(tried):.2g} m if"
     if reading.distance != 1.0 and isinstance(held.stage, FormedPhotos):
         return _of_distance(held.stage.strip, reading.distance, head, numbers)
-    if reading is MIRRORED and axes_are_right:
-        message = (
-            f"{head} it is mirrored; the control lies where its coordinate reference system is, so the image "
-            "coordinates are mirrored: y counted the other way, x and y exchanged, or negatives read as positives"
-        )
-        fix = "correct `observations.y_axis`, the columns x and y, or the side from which the photos were measured"
-        return found("P103", message, fix, numbers, strips=(strip,), key="observations.y_axis")
-    message = f"{head} {reading.text}"
-    if reading is MIRRORED and axes_are_right is None:
-        message += "; or else the image coordinates are mirrored"
+    if reading.mirrored:
+        return found(reading.code, f"{head} it is mirrored", "", numbers, points=tried.points.ids, strips=(strip,))
+    lists = np.unique(tried.points.frame).tolist() if number is None else [number]
+    fix = reading.fix or f"write {axes_to_write(frames, reading.order, lists)}"
     points = () if number is None else tried.points.take(tried.points.frame == number).ids
-    return found(reading.code, message, reading.fix, numbers, points=points, strips=(strip,), key=key)
+    return found(reading.code, f"{head} {reading.text}", fix, numbers, points=points, strips=(strip,), key=key)
+
+
+def axes_to_write(frames: Sequence[GroundFrame], order: tuple[int, int, int], lists: Sequence[int]) -> str:
+    """Say which axes the project file must give to some lists, so that these columns are east, north, up."""
+    written = []
+    for place in lists:
+        names = CARTESIAN_AXES if "x" in frames[place].axes else GROUND_AXES
+        columns = [names[order.index(names.index(axis))] for axis in frames[place].axes]
+        written.append(f"`control[{place}].axes: [{', '.join(columns)}]`")
+    return " and ".join(written)
+
+
+def of_mirrored(
+    findings: Sequence[Finding], inputs: Inputs, frames: Sequence[GroundFrame], right: str
+) -> list[Finding]:
+    """Name what may have mirrored strips, all of them together (P103, P401).
+
+    Two axes of the control exchanged, those of the photos, or one of them turned: each fits as well as the others. What
+    tells them apart is the place of the control on the Earth, strips that fit it as it is, lists of both hands, and a
+    format that holds the points one way only.
+
+    findings: of each strip that fits as its mirror image, with the control that it shows.
+    right: what tells that the axes of the control are right; empty where nothing does.
+    """
+    if not findings:
+        return []
+    strips, points = (tuple(name for each in findings for name in getattr(each, kind)) for kind in ("strips", "points"))
+    lists = np.unique(inputs.control.frame[locate(points, inputs.control.ids)]).tolist()
+    hands = {round(float(np.linalg.det(np.eye(3)[list(frames[number].order)]))) for number in lists}
+    causes, told = _of_photos([strip for strip in inputs.strips if strip.id in strips], inputs)
+    right = right or ("its lists, of both hands, agree" if len(hands) > 1 else "")
+    by_control = not (right or told)
+    if by_control:
+        two = "two of X, Y, Z" if "x" in frames[lists[0]].axes else "east and north"
+        backwards = ", or one of them counts backwards" if frames[lists[0]].kind == "local" else ""
+        causes = {f"{two} of the control are exchanged{backwards}": axes_to_write(frames, EXCHANGED, lists)} | causes
+    head = f"strips {listed(strips)} are mirrored: " if len(strips) > 1 else ""
+    why = "their format holds the points only so" if told else right and f"the control is right: {right}"
+    message = f"{head}{findings[0].message}: {', or '.join(causes)}{why and f' ({why})'}"
+    fix = f"write {', or '.join(causes.values())}" + ("; all fit alike" if len(causes) > 1 else "")
+    key = "control" if by_control else "models" if inputs.models is not None else "observations"
+    return [found("P401" if by_control else "P103", message, fix, findings[0].evidence, strips=strips, key=key)]
+
+
+def _of_photos(strips: Sequence[Strip], inputs: Inputs) -> tuple[dict[str, str], bool]:
+    """Say how image coordinates of strips, or their models, may have come to be mirrored, and what is to be written.
+
+    Returns causes and cures, and whether the format proves them: it holds the points only where x and y are exchanged.
+    """
+    if inputs.models is not None:
+        return {"the models are of the other hand": inputs.other_hand}, False
+    if inputs.fiducials is not None:  # which turn the photos to the hand of the calibrated marks
+        return {"the calibrated marks are mirrored": "the right signs in `fiducials` of the camera"}, False
+    turned = {"y of the photos counts the other way": inputs.other_hand} if inputs.other_hand else {}
+    exchanged = {"x and y of the photos are exchanged": "`observations.columns: {x: y, y: x}`"}
+    as_written, crosswise = (_inside(strips, inputs.observations, axes) for axes in ([0, 1], [1, 0]))
+    if as_written == crosswise or not turned:
+        return turned | exchanged, False
+    return (turned, False) if as_written else (exchanged, True)
+
+
+def _inside(strips: Sequence[Strip], observations: PhotoPoints, axes: list[int]) -> bool:
+    """Whether the formats of strips hold their image points, of which x and y are these axes."""
+    for strip in strips:
+        if strip.camera.format is not None:
+            xy = observations.xy[strip.positions(observations) >= 0][:, axes]
+            if (np.quantile(np.abs(xy), REACH_SHARE, axis=0) > np.array(strip.camera.format) / 2.0).any():
+                return False
+    return True
 
 
 def find_distance(

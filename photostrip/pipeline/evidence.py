@@ -344,6 +344,10 @@ def _put_right(observations: PhotoPoints, factor: dict[str, float], mirrored: fr
     return replace(observations, xy=observations.xy * by_photo[observations.photo])
 
 
+LEAST_DOWN = (
+    0.5  # cosine of what the mean axis of photos is off the vertical: oblique ones, too, look down upon the ground
+)
+MIRROR = np.array([1.0, -1.0, 1.0])  # what y of the images counted the other way does to a strip
 MOST_POINTS = 60  # control points that are looked at together: of more some are drawn, evenly along the strip
 AS_FORMED = Similarity(1.0, np.eye(3), np.zeros(3))
 
@@ -357,6 +361,7 @@ class OnControl:
     counted: StripAtControl  # those that are not far away
     kept: Flags  # (n, 3): coordinates that the others predict
     found: FoundErrors  # what they do not predict, far points aside
+    looks_down: bool | None  # whether its photos look down upon the control; None of models, where no centre tells it
 
     @cached_property
     def left(self) -> JointAdjustment:
@@ -394,6 +399,15 @@ class OnControl:
         return off, sigma
 
 
+def _looks_down(oriented: OrientedStrip) -> bool | None:
+    """Whether the photos of a strip on its control look down upon it; None of models without perspective centres."""
+    stage = oriented.stage
+    if isinstance(stage, LinkedModels) and not stage.formed.upright:
+        return None
+    axis = up(stage) if isinstance(stage, FormedPhotos) else np.array([0.0, 0.0, 1.0])
+    return bool(oriented.absolute.similarity.rotation[2] @ axis > LEAST_DOWN)
+
+
 @dataclass(frozen=True, eq=False)
 class HeldStrip:
     """A formed strip, and the control points that it shows."""
@@ -402,6 +416,7 @@ class HeldStrip:
     given: Numbers  # (n,): rows of these in the table of given points
     rows: Numbers  # (n,): their rows in the strip's points
     settings: Settings
+    of_other_hand: HeldStrip | None = None  # the strip whose mirror image it is
 
     @classmethod
     def of(cls, stage: FormedPhotos | LinkedModels, control: ControlPoints, settings: Settings) -> HeldStrip:
@@ -418,12 +433,29 @@ class HeldStrip:
     def covariance(self) -> Floats:
         """Covariance (3 n, 3 n) of those points, in the unit of the strip, but for a similarity."""
         stage = self.stage
+        if self.of_other_hand is not None:
+            hand = np.tile(MIRROR, len(self.rows))
+            return self.of_other_hand.covariance * np.outer(hand, hand)
         if isinstance(stage, FormedPhotos):
             errors = stage.errors(AS_FORMED)
             points = errors.points(self.rows)
             return errors.joint_covariance(points, errors.frames(points)[0]) * stage.excess
         joint = joint_cofactors(stage.network, coordinates_of(stage.network, stage.formed.point[self.rows]))
         return joint * stage.formed.links.factor
+
+    @cached_property
+    def mirrored(self) -> HeldStrip:
+        """The strip that images of the other hand form: its mirror image, whichever axis of theirs was turned."""
+        stage: FormedPhotos | LinkedModels = self.stage
+        if isinstance(stage, FormedPhotos):
+            formed = stage.formed
+            turned = {name: getattr(formed, name) * MIRROR for name in ("xyz", "model_xyz", "centers")}
+            rotations = formed.rotations * np.outer(MIRROR, MIRROR)
+            stage = replace(stage, formed=replace(formed, rotations=rotations, **turned))
+        else:
+            turned = {name: getattr(stage.formed, name) * MIRROR for name in ("node_xyz", "model_xyz")}
+            stage = replace(stage, formed=replace(stage.formed, **turned))
+        return replace(self, stage=stage, of_other_hand=self)
 
     def at_distance(self, factor: float) -> HeldStrip | None:
         """Return the strip formed with so many times its principal distance; None of models, or where it cannot be."""
@@ -466,7 +498,7 @@ class HeldStrip:
             kept[some] = kept_of(at_counted, found)
         except (PhotostripError, np.linalg.LinAlgError):
             return None
-        return OnControl(points=points, place=at_all, counted=at_counted, kept=kept, found=found)
+        return OnControl(points, at_all, at_counted, kept, found, _looks_down(oriented))
 
     def lies_on(self, control: ControlPoints, frames: Sequence[GroundFrame]) -> bool:
         """Whether the strip can be laid on its control at all, as that is read."""

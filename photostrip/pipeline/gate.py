@@ -38,6 +38,8 @@ OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
+OF_HANDS = ("P103", "P401")  # findings on axes, under which photos may come to lie below the ground
+BELOW = "P204"
 ALIKE = "P410"  # coordinates that are those of others
 OUTSIDE = "P402"  # control lies outside its coordinate reference system: what a map stretches there no camera did
 PAIR = 2  # photos
@@ -191,8 +193,10 @@ def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tu
     findings = list(findings)
     found = {strip.id for strip in inputs.strips if not strip.listed}
     silent = OF_CAMERAS if any(each.code == OUTSIDE for each in findings) else ()
+    turned = {strip for each in findings if each.code in OF_HANDS for strip in each.strips}
     told = (each for each in findings if found.isdisjoint(each.strips) or each.code not in OF_STRIPS)
     told = (each for each in told if each.code not in silent)
+    told = (each for each in told if each.code != BELOW or each.key or turned.isdisjoint(each.strips))
     if not settings.together:  # what is given of cameras takes no part
         told = (replace(each, severity="warning") if each.key.startswith(CAMERAS) else each for each in told)
     return accepted(told, settings.accept)
@@ -227,11 +231,10 @@ def _of_control(
     if control is None:
         return []
     copied = list(ids.find_copied_points(control.points, observations))
-    of_strips = [given_on_ground.of_strip(control, each, settings) for each in formed]
-    findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
+    whole, single = given_on_ground.of_strips(control, formed, settings)
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
-    single = (finding for each in of_strips for finding in each.slips) if slips else ()
-    return [*findings, *(each for each in single if named.isdisjoint(each.points))]
+    told = [each for each in single if slips and named.isdisjoint(each.points)]
+    return [*control.findings, *copied, *whole, *told]
 
 
 def _of_unadjusted_models(
@@ -263,10 +266,8 @@ def _of_models(
     formed: Sequence[LinkedModels], models: MeasuredModels, control: GivenControl, settings: Settings, *, slips: bool
 ) -> list[Finding]:
     """Look at strips of models: given points by themselves and in each strip, perspective centres."""
-    findings = [*control.findings]
-    for each in formed:
-        of_strip = given_on_ground.of_strip(control, each, settings)
-        findings += [*of_strip.whole, *(of_strip.slips if slips else ())]
+    whole, single = given_on_ground.of_strips(control, formed, settings)
+    findings = [*control.findings, *whole, *(single if slips else ())]
     for held in given_on_ground.model_strips(formed, models.points.point_ids, control.points):
         findings += flight.find_odd_centers(held.centers, held.depth, given_on_ground.UP, held.photos, held.strip.id)
         findings += given_on_ground.weak_layout_of_models(held, control)

@@ -58,6 +58,7 @@ class GivenControl:
     findings: tuple[Finding, ...]  # P401, P402, P403, by the place alone
     as_written: bool  # whether the frames cannot be right, so that the numbers count as plain metres
     axes_are_right: bool | None  # None where the place does not say
+    inputs: Inputs
 
     @classmethod
     def placed(cls, inputs: Inputs, frames: Sequence[GroundFrame], directory: Path | None) -> Self:
@@ -79,6 +80,7 @@ class GivenControl:
             findings=tuple(finding for place in places for finding in place.findings),
             as_written=not any(place.inside for place in places),
             axes_are_right=sure.pop() if len(sure) == 1 else None,
+            inputs=inputs,
         )
 
     @cached_property
@@ -93,6 +95,8 @@ class OfStrip:
 
     whole: list[Finding] = field(default_factory=list)  # of all of them, or of a list: P103, P105, P107, P401 to P410
     slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
+    mirrored: list[Finding] = field(default_factory=list)  # that it fits as its mirror image, without the cause
+    confirmed: frozenset[int] = frozenset()  # control lists that it fits as they are given
 
 
 def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
@@ -106,22 +110,43 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
     if whole:
         return OfStrip(whole)
     better = control_readings.find_reading(held, points, control.read_in, as_given)
+    mirrored: list[Finding] = []
     if better is not None:
-        whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))
+        into = mirrored if better.reading.mirrored else whole
+        into.append(control_readings.named(better, as_given, held, control.frames))
     else:
         whole += control_readings.of_whole_control(held, as_given, points, control.read_in)
         whole += [] if whole or as_given is None else shared_errors.of_formed(as_given, stage)
     laid, reading = (as_given, control_readings.AS_GIVEN) if better is None else (better.laid, better.reading)
+    fits = better is None and as_given is not None and as_given.fits
+    confirmed = frozenset(points.frame[held.given].tolist()) if fits else frozenset()
+    of_all = OfStrip(whole, mirrored=mirrored, confirmed=confirmed)
     if laid is None or not laid.fits or reading.rows or (whole and better is None):
-        return OfStrip(whole)
+        return of_all
     given = given_points.level(points.take(held.given), control.frames, as_written=control.as_written)
     if given is None:
-        return OfStrip(whole)
+        return of_all
     off, sigma = laid.off
     off = reading.as_written(off, signed=True) + given.moved * given.steps.unit
     named = [given.ids.index(name) for name in whole[0].points] if whole else []
     off[named] = np.nan  # of a list that lies beside the others
-    return OfStrip(whole, list(given_points.find_slips(given, off, reading.as_written(sigma, signed=False), (strip,))))
+    of_all.slips.extend(given_points.find_slips(given, off, reading.as_written(sigma, signed=False), (strip,)))
+    return of_all
+
+
+def of_strips(
+    control: GivenControl, stages: Iterable[FormedPhotos | LinkedModels], settings: Settings
+) -> tuple[list[Finding], list[Finding]]:
+    """Compare the given points with all formed strips: what all of them show, and slips of single ones."""
+    all_strips = [of_strip(control, each, settings) for each in stages]
+    mirrored = [finding for each in all_strips for finding in each.mirrored if control.axes_are_right is not False]
+    shown = locate([name for each in mirrored for name in each.points], control.points.ids)
+    confirmed = frozenset[int]().union(*(each.confirmed for each in all_strips))
+    right = "other strips fit it as it is" if confirmed & set(control.points.frame[shown].tolist()) else ""
+    right = "it lies where its crs is" if control.axes_are_right else right
+    whole = control_readings.of_mirrored(mirrored, control.inputs, control.frames, right)
+    whole += [finding for each in all_strips for finding in each.whole]
+    return whole, [finding for each in all_strips for finding in each.slips]
 
 
 @dataclass(frozen=True, eq=False)
@@ -469,7 +494,7 @@ class OverControl:
         )
         numbers: Evidence = {"misfit_percent": share}
         place = f"{key}.axes" if reading.code == "P401" else f"{key}.crs"
-        fix = reading.fix.replace("`control.axes`", f"`{place}`")
+        fix = reading.fix or f"put `{place}` into the order of the columns"
         if self.given.frame.crs == "local":  # whose place nobody knows
             fix += "; or is it the control that is in another unit, or order of axes?"
         return found(reading.code, message, fix, numbers, photos=self.given.photos, key=place)
@@ -478,7 +503,7 @@ class OverControl:
         """Give the readings of given coordinates that mean something of centres, and the frames of the control."""
         enu, frame = self.given.enu, self.given.frame
         for reading in control_readings.READINGS:
-            if not (reading.rows or reading.without or np.isnan(reading.distance)):
+            if not (reading.rows or reading.without or reading.mirrored or np.isnan(reading.distance)):
                 yield reading, frame, enu[:, reading.order] * reading.factor
         for number, other in enumerate(self.inputs.frames):
             if other != frame:

@@ -129,6 +129,9 @@ class Inputs:
     orientations: GivenOrientations | None = None
     # measured model coordinates; there are then no `strips` of photos, and `observations` only name the points
     models: MeasuredModels | None = None
+    # what a project file says where image or model coordinates are of the other hand than they are read; empty for
+    # pixels counted from a corner, which lie on one side of it
+    other_hand: str = "`observations.y_axis: down`"
 
     @property
     def cameras(self) -> dict[str, Camera]:

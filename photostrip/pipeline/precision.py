@@ -159,18 +159,20 @@ def _ties(strips: Sequence[StripResult], output: GroundFrame) -> Ties:
     return Ties(point[second], np.column_stack([strip[second - 1], strip[second]]), difference)
 
 
-def not_determined(
-    observations: PhotoPoints, points: Adjusted, inputs: Inputs, strips: Sequence[StripResult]
-) -> dict[str, str]:
+def not_determined(adjusted: AdjustedStrips, inputs: Inputs) -> dict[str, str]:
     """Points that were measured and have no coordinates, with the reason."""
+    observations = adjusted.observations
     done = np.zeros(len(observations.point_ids), bool)
-    done[points.number] = True
+    done[adjusted.points.number] = True
     if inputs.models is not None:
         why = "coordinates in the models contradict each other, or were left out"
         return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
-    wrong = [each for strip in strips for each in strip.of_photos.wrong_rays]
+    wrong = [each for strip in adjusted.strips for each in strip.of_photos.wrong_rays]
     contradicted = {int(observations.point[each.row]): each.kind == "control" for each in wrong}
+    if adjusted.bundle is not None:  # of any two photos
+        in_network = np.bincount(observations.point[adjusted.bundle.block.rows])
+        contradicted = dict.fromkeys(np.flatnonzero(in_network > 1).tolist(), False) | contradicted
     on_photos: dict[int, list[tuple[int, int]]] = {}
     for row in np.flatnonzero(~done[observations.point]):
         photo = observations.photo_ids[observations.photo[row]]

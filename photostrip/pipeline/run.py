@@ -259,7 +259,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         adjusted = _adjusted(inputs, settings, ground, refined.observations, formed, whole)
         missing = {}
         if whole is None:
-            missing = not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips)
+            missing = not_determined(adjusted, inputs)
         # 6 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(

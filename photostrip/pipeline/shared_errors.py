@@ -6,6 +6,7 @@ What a bundle adjustment took up as common to all camera positions, or to all ph
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import floor, log10
 
 import numpy as np
 
@@ -210,12 +211,13 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
     strips = [each for each in inputs.strips if each.camera.name == parameter.camera]
     camera = strips[0].camera
     would_fit = camera.principal_distance + parameter.value
+    decimals = max(2, 1 - floor(log10(max(parameter.sigma, 1e-6))))  # two digits of the standard deviation
     of_cameras = inputs.positions is not None or (inputs.orientations is not None and inputs.orientations.observed)
     given = ["control"] * bool(inputs.frames) + ["camera positions"] * of_cameras
     message = (
         f"the photos of camera {camera.name} agree with {' and '.join(given)} at a principal distance of "
-        f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm is given. "
-        "The adjustment continued with the one that fits"
+        f"{would_fit:.{decimals}f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm "
+        "is given. The adjustment continued with the one that fits"
     )
     fix = f"{CAUSES[DISTANCE].cure}; if that agrees with what is given, {_decision(['principal_distance'])}"
     numbers: Evidence = {"standard_deviation_mm": parameter.sigma}

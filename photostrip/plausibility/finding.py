@@ -53,7 +53,7 @@ KINDS: dict[str, Kind] = {
     ),
     "P103": Kind(
         "image coordinates mirrored",
-        "the strip fits its control only so: x and y exchanged, y down, a negative",
+        "the strip fits its control only so, and the control is right",
         ERROR,
     ),
     "P104": Kind("one photo mirrored against its neighbours", "it fits its neighbours only as a mirror image", ERROR),
@@ -128,8 +128,8 @@ KINDS: dict[str, Kind] = {
         WARNING,
     ),
     "P401": Kind(
-        "axes exchanged or left-handed",
-        "the strip fits only mirrored, the area of the crs, or camera positions, only exchanged",
+        "axes exchanged, or photos mirrored",
+        "the strip fits only so, or the area of the crs, or camera positions, only with exchanged axes",
         ERROR,
     ),
     "P402": Kind(

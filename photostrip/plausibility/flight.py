@@ -117,8 +117,8 @@ def _robust_lines(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...], known: float) -> Iterator[Finding]:
-    step = np.diff(np.log(np.maximum(length, 1e-12)))
-    ratios = length / np.maximum(np.nanmedian(_beside(length), axis=1), 1e-12)
+    length = np.maximum(length, 1e-12)  # photos at one place
+    step, ratios = np.diff(np.log(length)), length / np.nanmedian(_beside(length), axis=1)
     for number, ratio in enumerate(ratios.tolist()):
         if SHORT_BASE < ratio < LONG_BASE:
             continue

@@ -357,7 +357,8 @@ def _outside(frame: GroundFrame, areas: AreasOfUse, level: Floats, where: str, t
     zone = _other_zone(frame, areas.projection, level)
     if _inside(frame, areas.crs, level[:, [1, 0, 2]]):
         message = f"{head}; with east and north exchanged it would lie there"
-        fix = "put `control.axes` into the order of the columns" + (f", or {zone}" if zone else "")
+        axes = ", ".join({"east": "north", "north": "east"}.get(axis, axis) for axis in frame.axes)
+        fix = f"write `axes: [{axes}]`" + (f", or {zone}" if zone else "")
         return found("P401", message, fix, evidence, key=".axes")
     for code, changed, what, fix in _readings(level):
         if _inside(frame, areas.crs, changed):

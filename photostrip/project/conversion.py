@@ -193,6 +193,16 @@ def photo_points(
     )
 
 
+def other_hand(project: ProjectFile) -> str:
+    """Return what would be written if image or model coordinates were of the other hand; empty where none can be."""
+    if project.models is not None:
+        return f"`models.axes: {'right' if project.models.axes == 'left-handed' else 'left'}-handed`"
+    given = project.observations
+    if given is None or given.origin not in {None, "center"}:
+        return ""
+    return f"`observations.y_axis: {'up' if given.y_axis == 'down' else 'down'}`"
+
+
 def _millimetres(unit: str, owner: camera.Camera | None) -> tuple[float, float]:
     """Factor and divisor that make millimetres of a unit; a division keeps 12345 um exactly 12.345 mm."""
     if unit == "px":

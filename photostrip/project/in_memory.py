@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", "Fault", "Finding", "Note")
 FILE = "file"  # key of the table of a block
+NAMING = {"photo", "point"}  # columns of which every table has one, and no block a key
+MANY = "as many tables, in a list, each with columns by name"
+TABLE = "a data frame, a structured array, or a mapping of names of columns to values"
 PROJECT, SPECIFICATION = "project", "specification"  # what mappings are called in messages
 
 
@@ -54,13 +57,14 @@ def with_tables(content: Mapping[str, Any], overrides: Mapping[str, Any]) -> tup
         else:
             count = len(block) if isinstance(block, list) else 1
             message = f"{len(tables)} tables are given for {count} of `{key}`"
-            raise InputError(Fault(message, "table-shape", PROJECT, key=key, expected="as many tables, in a list"))
+            raise InputError(Fault(message, "table-shape", PROJECT, key=key, expected=MANY))
     return found, rest
 
 
 def _is_frame(value: object) -> bool:
-    """Whether a value can be a table only: a data frame of any library, or a structured array."""
-    return hasattr(value, "columns") or (isinstance(value, np.ndarray) and value.dtype.names is not None)
+    """Whether a value can be a table only: a data frame of any library, an array, or columns by name."""
+    by_name = isinstance(value, Mapping) and not NAMING.isdisjoint(value)
+    return hasattr(value, "columns") or isinstance(value, np.ndarray) or by_name
 
 
 def _named(value: Any, path: str, tables: dict[str, Any]) -> Any:  # noqa: ANN401 (values of a project file)
@@ -126,13 +130,13 @@ def _text(name: str, table: Any) -> str:  # noqa: ANN401 (data frames of any lib
         names = _names(table)
         columns = [_values(table[each]) for each in names]
     except (AttributeError, IndexError, KeyError, TypeError):
-        expected = "a data frame, a structured array, or a mapping of names of columns to values"
-        raise InputError(
-            Fault(f"is a {type(table).__name__}, no table", "table-shape", name, expected=expected)
-        ) from None
+        message = f"is a {type(table).__name__}, no table"
+        raise InputError(Fault(message, "table-shape", name, expected=TABLE)) from None
     lengths = {each: column.shape for each, column in zip(names, columns, strict=True)}
-    if not names or any(len(shape) != 1 for shape in lengths.values()) or len(set(lengths.values())) > 1:
-        found = ", ".join(f"{each} {shape}" for each, shape in lengths.items()) or "no columns"
+    if not names or (isinstance(table, Mapping) and () in lengths.values()):
+        raise InputError(Fault("has no columns with names", "table-shape", name, expected=TABLE))
+    if any(len(shape) != 1 for shape in lengths.values()) or len(set(lengths.values())) > 1:
+        found = ", ".join(f"{each} {shape}" for each, shape in lengths.items())
         raise InputError(Fault(f"has columns of different shapes: {found}", "table-shape", name, expected="(n,) each"))
     rows = zip(*(column.tolist() for column in columns), strict=True)
     return to_csv(map(str, names), ([_cell(value) for value in row] for row in rows))

@@ -355,6 +355,7 @@ def _inputs(
         positions=conversion.camera_positions(tables.positions, project.camera_positions, photos),
         orientations=conversion.given_orientations(tables.orientations, project.orientations, photos, frames_of),
         models=models,
+        other_hand=conversion.other_hand(project),
     )
     return inputs, [*derived, *joined, *_from_true_north(project, inputs, root, frames_of)]
 

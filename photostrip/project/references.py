@@ -285,7 +285,8 @@ def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
             yield fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix)
     if _lacks(root, "control"):
         expected = "lists of given ground coordinates, each in its own frame"
-        yield fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected)
+        fix = "or `processing.adjustment: bundle`, which orients photos among themselves, without place and scale"
+        yield fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected, fix=fix)
     elif control is not None and isinstance(control.value, list) and not control.value:
         expected = "at least 1 control list"
         yield fault_at(root, ("control",), "there is no control list", "length", expected=expected)

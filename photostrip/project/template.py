@@ -83,9 +83,8 @@ def template_files(name: str) -> dict[str, str]:
     }
 
 
-def refuse_existing(folder: Path, names: list[str]) -> None:
+def refuse_existing(folder: Path, names: list[str], fix: str = "choose another folder, or remove it") -> None:
     """Refuse to overwrite what a user may have written."""
     there = [folder / name for name in names if (folder / name).exists() or (folder / name).is_symlink()]
     if there:
-        fix = "choose another folder, or remove it"
         raise InputError(Fault("already exists and is not overwritten", "exists", str(path), fix=fix) for path in there)

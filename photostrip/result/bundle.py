@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,7 +61,7 @@ def bundle_of(result: Result) -> Document:
         return {}
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
-    shift = screened.limit.shifts(settings.power)
+    shift, groups = screened.limit.shifts(settings.power), _tested(found)
     written = kinds(result.settings.angle_unit, of_models=problem.of_models)
     block: Document = {
         "free_network": solution.free,
@@ -87,13 +87,14 @@ def bundle_of(result: Result) -> Document:
         "reliability": {
             "power": settings.power,
             "noncentrality": shift[reliability.IMAGE],
+            "noncentrality_given": shift[reliability.CONTROL],
             **_image_sigma(found),
             "groups": Table.of_rows(
                 "bundle.reliability.groups",
-                (_group(group, shift[group.kind], written[group.kind]) for group in found.groups),
+                (_group(group, shift[group.kind], written[group.kind]) for group in groups),
             ),
-            "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in found.groups]),
-            "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in found.groups]),
+            "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in groups]),
+            "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in groups]),
         },
         "variance_components": Table.of_rows(
             "bundle.variance_components",
@@ -111,6 +112,11 @@ def bundle_of(result: Result) -> Document:
     return {"bundle": record("bundle", block)}
 
 
+def _tested(found: Bundle) -> list[reliability.Group]:
+    """Return the observations with the standard deviations by which the search for gross errors tests them."""
+    return [replace(each, sigma=each.sigma * found.screened.limit.unit) for each in found.groups]
+
+
 def _sigma0(found: Bundle) -> Document:
     test = found.sigma0
     passed = test.passed if np.isfinite(test.lower) else None
@@ -125,6 +131,9 @@ def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, Gr
         "test": settings.test,
         "alpha": screened.limit.alpha,
         "limit": screened.limit.value,
+        "alpha_given": screened.limit.alpha_of_given,
+        "limit_given": screened.limit.given,
+        "unit": screened.limit.unit,
         "rejected": {written[kind].name: sum(each.kind == kind for each in out) for kind in OBSERVED},
         "readmitted": len(screened.rejections) - len(out),
     }
@@ -280,12 +289,13 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     if found is None or result.model_strips:
         return residuals
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
-    columns = {"redundancy": group.redundancy} | ({} if _image_sigma(found) else {"sigma": group.sigma * MICROMETRES})
+    columns = {"redundancy": group.redundancy, "test": group.standardised / found.screened.limit.unit}
+    columns |= {} if _image_sigma(found) else {"sigma": group.sigma * MICROMETRES}
     at = np.full(len(result.refined.observations), len(group.sigma))  # the last row: a ray that took no part
     at[found.block.rows[found.screened.selection.images]] = np.arange(len(group.sigma))
     at = at[np.concatenate([image.rows for image in images])]
     values = {key: np.vstack([column, np.full(2, np.nan)])[at] for key, column in columns.items()}
-    units = {"redundancy": "", "sigma": "_um"}
+    units = {"redundancy": "", "test": "", "sigma": "_um"}
     return residuals.with_columns(
         **{f"{key}_{axis}{units[key]}": of_key[:, k] for key, of_key in values.items() for k, axis in enumerate("xy")}
     )
@@ -303,14 +313,15 @@ def _foremost(
 ) -> Table:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
-    for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
+    groups = _tested(found)
+    for number, (group, value) in enumerate(zip(groups, values, strict=True)):
         known = np.isfinite(group.sigma) & np.isfinite(value)
         flat = np.where(known, value, -np.inf).ravel()
         best = np.argsort(-flat, kind="stable")[:SHOWN]
         chosen += [(-float(flat[at]), number, int(at)) for at in best.tolist() if np.isfinite(flat[at])]
     rows = []
     for _, number, at in sorted(chosen)[:SHOWN]:
-        group = found.groups[number]
+        group = groups[number]
         place = np.array([divmod(at, group.sigma.shape[1])])
         columns = _observed(found, group, place, shift[group.kind], written[group.kind])
         rows.append({key: column[0] for key, column in columns.items()})

@@ -33,7 +33,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     taken_out, said = rejected.rejected_of(result), (*notes, *result.notes)
     counts = summary.counts_of(result, sum(len(image.rows) for image in images))
     table = points.points_of(result, points.point_rms(result, images), rank)
-    unchecked = points.unchecked_notes(table, taken_out, counts["image_points"])
+    unchecked = points.unchecked_notes(table, taken_out)
     lost = rejected.lost_say_notes(result, images, taken_out, said)
     body: Document = {
         "adjustment": summary.adjustment_of(result),
@@ -82,9 +82,9 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
 
 
 def _finding(finding: Finding) -> Document:
-    """Return a finding; the numbers of its evidence have six digits."""
+    """Return a finding; the numbers of its evidence have six digits, coordinates three decimals."""
     evidence = {
-        name: float(f"{value:.6g}") if isinstance(value, float) else value
+        name: (round(value, 3) if abs(value) > 1000 else float(f"{value:.6g}")) if isinstance(value, float) else value
         for name, value in sorted(finding.evidence.items())
     }
     said = attributes(finding, f"code title severity accepted message fix evidence strips {CONCERNED}")

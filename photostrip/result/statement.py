@@ -249,12 +249,13 @@ def _reasons(document: Document, figures: Document, ids: Sequence[str], odd: Seq
         text = f"the verdict on the result is {document['status'].upper()}"
         yield reason("statement-verdict", text, "settle what the report names first")
     if odd:
-        text = f"{len(odd)} of {len(ids)} check points do not go with the others"
-        yield reason("statement-odd-points", text, "find out what is wrong with them; do not leave them out", odd)
+        text = f"{len(odd)} of {len(ids)} check points {'does' if len(odd) == 1 else 'do'} not go with the others"
+        yield reason("statement-odd-points", text, "find out what is wrong there; do not leave it out", odd)
     checks = set(ids)
     named = {point for each in document["findings"] if not each["accepted"] for point in each["points"]}
     if blamed := [name for name in ids if name in named & checks and name not in odd]:
-        text = f"{len(blamed)} of {len(ids)} check points are named by a finding that nobody has accepted"
+        verb = "is" if len(blamed) == 1 else "are"
+        text = f"{len(blamed)} of {len(ids)} check points {verb} named by a finding that nobody has accepted"
         yield reason("statement-odd-points", text, "settle the finding, or accept it in the project", blamed)
 
 

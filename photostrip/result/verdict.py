@@ -348,14 +348,15 @@ def _agreement(document: Document, tests: Tests) -> str:
 
 def _contradiction(who: str, document: Document, found: Document, ratio: str, chance: float) -> str:
     said = [
-        f"in {name} {part[ratio]:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
+        f"in {name} {part[ratio]:.1f} times as large as expected, {part['inside_95']} of {part['count']} inside the "
+        f"95 % {AREAS[name]}"
         for name in PARTS
         if (part := found[name])["count"]
     ]
     likely = f"{100 * chance:.1f} %" if chance >= SMALLEST_PROBABILITY else f"below {100 * SMALLEST_PROBABILITY:g} %"
     return (
-        f"{who} are farther off than expected from the standard deviations of the points: {'; '.join(said)}; "
-        f"probability {likely} by chance{_known_cause(document)}"
+        f"the differences at {who} contradict the standard deviations of the points: {'; '.join(said)}; probability of "
+        f"that by chance {likely}{_known_cause(document)}"
     )
 
 
@@ -416,7 +417,7 @@ def _pairs(document: Document, tests: Tests) -> Iterator[str]:
 
 def _more(number: int, one: str, kind: str = "") -> Iterator[str]:
     if number > NAMED:
-        yield f"{counted(number - NAMED, f'more {one}')}{kind} like these"
+        yield f"{counted(number - NAMED, f'more {one}')}{kind}, like the last one"
 
 
 def _photos(document: Document, tests: Tests) -> Iterator[str]:

@@ -225,7 +225,7 @@ def _single_errors(spec: ModelSpec) -> Rows:
     return Rows(
         "single",
         "What one error of each kind does to the corner of the model, eq. 10.7",
-        (Field("error_of", head="error of"), Field("error_um", "um 1"), *fields("x_m y_m z_m", "m +4", HEADS)),
+        (Field("error_of", head="error of"), Field("error_um", "um 1", "error"), *fields("x_m y_m z_m", "m +4", HEADS)),
         [
             (
                 name,

@@ -6,11 +6,11 @@ power ``"mm² e4"``; ``"ratio 2"`` has no unit. JSON and CSV have a few more tha
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,9 @@ from photostrip.notes import Document
 from photostrip.report.page.layout import USUAL, to_markdown, to_text
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import Cell, Field, tabulated, with_unit, written
+
+if TYPE_CHECKING:
+    from photostrip.report.pictures.svg import Picture
 
 Filled = tuple[Field, Any]  # a column with its values; what is no sequence of them stands in every row
 MORE_DECIMALS, MORE_DIGITS = 3, 4  # of JSON and CSV, that are not printed
@@ -167,10 +170,15 @@ class Sheet:
         names = [each.key for each in parts[0].fields if each.key]
         return to_csv(names, (row.values() for each in parts for row in each.plain()))
 
-    def rendered(self, form: str, width: int = USUAL) -> str:
+    def rendered(self, form: str, width: int = USUAL, draw: Callable[[Document], Picture] | None = None) -> str:
         """Return the sheet as a file holds it: ``text`` so wide, ``md``, ``html``, ``json`` or ``csv``."""
         if form == "csv":
             return self.csv()
+        if form == "html" and draw is not None:
+            from photostrip import __version__
+            from photostrip.report.html import sections_html
+
+            return sections_html(self.title, __version__, self.sections(), [draw(self.document())])
         return rendered(form, self.title, self.sections(), self.document() if form == "json" else {}, width)
 
 

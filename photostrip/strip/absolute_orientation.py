@@ -243,7 +243,7 @@ def lay(
             )
             raise GeometryError(message, points=targets.control.ids, code="control-of-other-points")
         message = "the strip fits the control only upside down: control or image coordinates are left-handed"
-        expected = "the axes in the order of the columns, [north, east, up] where X is north; or `y_axis: down`"
+        expected = "`axes: [north, east, up]` where x is north, else the y axis of the photos as it was measured"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
     return Laid(similarity, values, iteration)
 

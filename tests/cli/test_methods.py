@@ -99,7 +99,7 @@ def test_the_classical_adjustment_stands_beside_it(answer: Answer, run: Run) -> 
     said = " ".join(answer("run", SAMPLE).split())
     degrees = "degree {degree_plan} in plan and {degree_height} in height".format(**strip)
     left = "{plan:.3f}/{height:.3f} m at check points".format(**classical["check_rms"])
-    assert f"polynomials instead {degrees}; rms in plan/height" in said
+    assert f"by polynomials {degrees}; rms in plan/height" in said
     assert left in said
 
 

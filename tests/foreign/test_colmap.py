@@ -83,7 +83,7 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: Capture) -
     source = simulated(tmp_path / "native").write_text(tmp_path / "model")
     before = (tmp_path / "native" / "project.yaml").read_bytes()
     assert convert(source, tmp_path / "native") == 2
-    assert "project.yaml: already exists and is not overwritten" in capsys.readouterr().err
+    assert "already exists and is not overwritten; choose another folder, or use --force" in capsys.readouterr().err
     assert (tmp_path / "native" / "project.yaml").read_bytes() == before
     assert convert(source, tmp_path / "native", "--force", "-q") == 0
     assert (tmp_path / "native" / "project.yaml").read_bytes() != before

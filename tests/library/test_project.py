@@ -178,14 +178,17 @@ def test_what_is_not_there_or_twice_is_found_as_in_files(
 @pytest.mark.parametrize("table", [None, 7, np.zeros((3, 4))])
 def test_what_is_no_table_is_refused(project: dict[str, Any], table: object) -> None:
     project["observations"]["file"] = table
-    message = r"observations: (is a \w+, no table|has columns of different shapes)"
+    message = r"observations: (is a \w+, no table|has no columns with names)"
     with pytest.raises(photostrip.InputError, match=message):
         photostrip.load(project)
+    if isinstance(table, np.ndarray):
+        with pytest.raises(photostrip.InputError, match=message):
+            photostrip.load(project | {"observations": {"unit": "mm"}}, observations=table)
 
 
 def test_texts_may_be_bytes(project: dict[str, Any]) -> None:
     images = project["observations"]["file"]
-    expected = photostrip.load(project).loaded.inputs.observations.point_ids
+    expected = photostrip.load(project, observations=images).loaded.inputs.observations.point_ids
     project["observations"]["file"] = images | {"point": np.array(images["point"]).astype("S12")}
     assert photostrip.load(project).loaded.inputs.observations.point_ids == expected
 

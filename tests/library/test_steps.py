@@ -324,9 +324,6 @@ def test_what_determines_nothing_is_refused(call: Callable[[], object], message:
         call()
 
 
-# --------------------------------------------------------------------------------------------------- as commands
-
-
 class Noisy(NamedTuple):
     """Common points of two photos, with noise."""
 

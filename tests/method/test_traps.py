@@ -15,7 +15,8 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
-from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Spec, Terrain, simulate
+from photostrip.result.document import document_of
+from photostrip.simulation import DIGITAL, FILM, Control, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
 from photostrip.strip import absolute_orientation
 from photostrip.strip.polynomial import PolynomialSettings
 from tests.results import write_project
@@ -94,27 +95,26 @@ def with_rows(inputs: Inputs, rows: list[tuple[str, str, float, float]]) -> Inpu
 
 
 @pytest.mark.slow
-def test_points_seen_once_are_listed_and_change_nothing() -> None:
-    done = simulate(Spec())
-    inputs = inputs_of(done)
-    photos = inputs.strips[0].photos
-    more = with_rows(
-        inputs,
-        [
-            (photos[2], "once", 3.0, -50.0),
-            (photos[3], "apart", 60.0, 10.0),
-            (photos[5], "apart", -60.0, 10.0),
-        ],
-    )
-    settings = Settings(adjustment="polynomial")  # a bundle takes points of any two photos
-    before, after = triangulate(inputs, settings), triangulate(more, settings)
-    assert after.not_determined == {
-        "once": "measured on one photo only",
-        "apart": "not on two neighbouring photos of one strip",
-    }
+@pytest.mark.parametrize(
+    ("adjustment", "apart"),
+    [("polynomial", "not on two neighbouring photos of one strip"), ("bundle", "rays contradict each other")],
+)
+def test_points_seen_once_are_listed_and_change_nothing(adjustment: str, apart: str) -> None:
+    """As many as would loosen the test of gross errors, if they counted as found wrong."""
+    inputs = inputs_of(simulate(Spec(seed=3, gross_errors=(GrossError("image", count=3, size_um=70.0),))))
+    photos, random = inputs.strips[0].photos, np.random.default_rng(1)
+    inputs = with_rows(inputs, [(photos[3], "apart", 60.0, 10.0), (photos[5], "apart", -60.0, -30.0)])
+    once = [(photo, f"S{n}", *random.uniform(-90.0, 90.0, 2).tolist()) for n, photo in enumerate(photos * 10)]
+    before, after = (triangulate(each, Settings(adjustment=adjustment)) for each in (inputs, with_rows(inputs, once)))
+    assert before.not_determined["apart"] == apart
+    reasons = {point: "measured on one photo only" for _, point, _, _ in once}
+    assert after.not_determined == before.not_determined | reasons
     np.testing.assert_array_equal(before.points.number, after.points.number)
-    np.testing.assert_array_equal(before.points.cartesian, after.points.cartesian)
-    np.testing.assert_array_equal(before.strips[0].resection.rotations, after.strips[0].resection.rotations)
+    a, b = (document_of(result) for result in (before, after))
+    assert {key for key in a if a[key] != b[key]} == {"counts", "not_determined", "residuals"}
+    assert a["counts"] | {key: b["counts"][key] for key in ("image_points", "not_determined")} == b["counts"]
+    (ray,) = b["residuals"].where(point="S7")
+    assert (ray["vx_um"], ray["vy_um"], ray["used"]) == (None, None, False)
 
 
 @pytest.mark.parametrize(("kappa", "across"), [(0.0, False), (31.0, False), (90.0, False), (0.0, True)])

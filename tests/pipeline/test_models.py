@@ -111,10 +111,8 @@ def mistaken(kind: str) -> Inputs:
     inside = points.node < len(points.point_ids)
     if kind == "a model in metres":
         xyz[points.model == 2] /= 1000
-    elif kind == "sigma in mm":
-        sigma = sigma * 1000
-    elif kind == "sigma in m":
-        sigma = sigma / 1000
+    elif kind.startswith("sigma"):
+        sigma = sigma * {"sigma in mm": 1000.0, "sigma in m": 0.001}[kind]
     elif kind == "centers below":
         for model in range(len(points.model_ids)):
             rows = points.model == model

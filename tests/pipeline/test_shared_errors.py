@@ -52,8 +52,7 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
     """Tested one by one, 12 control coordinates and 23 positions went, and points were 7 to 10 m off."""
     simulation, result = adjusted(strips=strips, shift=shift)
     (finding,) = result.findings
-    assert finding.code == "P208"
-    assert finding.key == "camera_positions.correction"
+    assert (finding.code, finding.key) == ("P208", "camera_positions.correction")
     assert "`correction: offset`" in finding.message
     assert offset(finding) == pytest.approx(shift, abs=0.6)
     assert lost(result, "control", "position") == []
@@ -78,8 +77,7 @@ def test_the_strip_method_names_a_principal_distance_off_by_a_percent(share: flo
     inputs = with_camera(inputs_of(simulation), principal_distance=153.0 * (1.0 + share))
     result = triangulate(inputs, settings_of(simulation))
     (finding,) = result.findings
-    assert finding.code == "P107"
-    assert finding.key == "cameras.film.principal_distance"
+    assert (finding.code, finding.key) == ("P107", "cameras.film.principal_distance")
     assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=0.4)
     assert result.strips[0].wrong_control == ()
 
@@ -97,8 +95,7 @@ def test_positions_of_other_photos_are_named_and_put_right(rows: slice | np.ndar
     """Sound control was blamed, or the adjustment did not converge."""
     simulation, result = adjusted(strips=1, rows=rows)
     (finding,) = result.findings
-    assert finding.code == "P208"
-    assert finding.key == "camera_positions"
+    assert (finding.code, finding.key) == ("P208", "camera_positions")
     assert finding.evidence["order"] == order
     moved = np.flatnonzero(np.arange(10)[rows] != np.arange(10)) if order == "exchanged" else np.arange(10)
     assert finding.photos == tuple(simulation.truth.photo_ids[row] for row in moved)
@@ -264,8 +261,7 @@ def test_an_unstated_lens_is_named_and_costs_nothing() -> None:
     sound, bent = simulate(spec), simulate(replace(spec, camera=replace(FILM, distortion=LENS)))
     result = undistorted(bent)
     (finding,) = result.findings
-    assert finding.code == "P110"
-    assert finding.key == "processing.self_calibration"
+    assert (finding.code, finding.key) == ("P110", "processing.self_calibration")
     assert "[k1]" in finding.fix
     assert finding.evidence["k1"] == pytest.approx(K1, abs=4 * float(finding.evidence["k1_standard_deviation"]))
     assert lost(result, "control") == []

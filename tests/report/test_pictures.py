@@ -194,7 +194,8 @@ def test_many_points_are_thinned_which_the_caption_says_and_panels_without_any_d
     at = np.random.default_rng(1).uniform(0.0, 100.0, (3 * MOST_DOTS, 2))
     picture = chart("many", ("Many", "A caption.", ""), [Map([Marks(at, words="new point")])])
     assert picture.svg.count("h0") == MOST_DOTS
-    assert picture.caption == f"A caption. Of {3 * MOST_DOTS} points one in 3 is drawn."
+    words = f"Of {3 * MOST_DOTS} points one in 3 is drawn; `points` in result.json has all."
+    assert picture.caption == f"A caption. {words}"
     nothing = Marks(np.zeros((0, 2)))
     assert "</svg>" in chart("empty", ("", "", ""), [Panel([nothing]), Panel([nothing], log=True), Map([nothing])]).svg
 

@@ -128,9 +128,6 @@ def test_coordinates_and_angles_have_the_units_of_their_result() -> None:
     assert document["photos"].units["angle_1"] == document["photos"].units["sigma_angle_1"] == "gon"
 
 
-# ------------------------------------------------------------------------------------------------------- tables
-
-
 ROWS = [
     {"strip": "1", "photo": None, "point": 'b"], [', "value": 1.234, "unit": "ppm", "zone": 2, "blamed": ["2", "x"]},
     {"strip": "1", "photo": "a", "point": "§\x85", "value": None, "unit": "", "zone": None, "blamed": []},

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from photostrip.foreign.adjusted import adjusted
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.report.page.layout import to_text
@@ -60,9 +61,6 @@ def test_what_nothing_verifies_is_not_good(plan: int, height: int, missing: str)
     assert text.count("no point verifies") == 1
 
 
-# ------------------------------------------------------------------------------------------- the tests of the program
-
-
 def moved(points: int, metres: float, axis: int = 0, adjustment: str = "polynomial") -> Document:
     """Displace the first so many of eight check points, in turn forth and back."""
     wanted = spec("projected", 2)
@@ -78,10 +76,15 @@ def test_check_points_beyond_their_standard_deviations_are_not_good(adjustment: 
     sound = moved(0, 0.0, adjustment=adjustment)
     assert (sound["status"], sound["verdict"]["look_at"]) == (GOOD, [])
     document = moved(8, 1.0, axis=2, adjustment=adjustment)
-    (text,) = (text for text in document["verdict"]["look_at"] if text.startswith("the check points are farther off"))
+    (text,) = (
+        text for text in document["verdict"]["look_at"] if text.startswith("the differences at the check points")
+    )
     check = document["precision"]["check"]
-    assert f"in height {check['height']['rms']:.1f} times, {check['height']['inside_95']} of 8 inside" in text
-    assert text.endswith("; probability below 0.1 % by chance")
+    assert (
+        f"in height {check['height']['rms']:.1f} times as large as expected, {check['height']['inside_95']} of 8 inside"
+        in text
+    )
+    assert text.endswith("; probability of that by chance below 0.1 %")
     assert document["status"] == LOOK
     # what follows from data that contradict themselves is not said
     error = a_finding("P406", "off by a digit", severity="error")
@@ -96,7 +99,7 @@ def test_what_the_check_points_say_is_told_with_its_probability(height: float, s
     found = with_check_p(plan=0.7, height=height, together=0.5 if said else 0.03)
     told = f"the check points {said} the standard deviations of the points, p = {3 * height:.2g}"
     assert (found["status"], found["agreement"]) == ((GOOD, told) if said else (LOOK, ""))
-    assert said or "probability 0.1 % by chance" in found["look_at"][0]
+    assert said or "by chance 0.1 %" in found["look_at"][0]
 
 
 def with_check_p(*, plan: float, height: float, together: float) -> Document:
@@ -119,7 +122,7 @@ def test_a_cause_that_is_known_needs_less_evidence() -> None:
     note = a_note("curvature-left-out", "", severity="note")
     found = verdict_of({**contradicted, "notes": [*document["notes"], note]})
     assert found["status"] == LOOK
-    assert "in height 2.2 times, 5 of 10 inside the 95 % interval" in found["look_at"][0]
+    assert "in height 2.2 times as large as expected, 5 of 10 inside the 95 % interval" in found["look_at"][0]
     assert found["look_at"][0].endswith("try `earth_curvature: model`")
 
 
@@ -207,9 +210,6 @@ def test_measurements_that_contradict_each_other_everywhere_are_no_result(noise:
         assert quiet(document).startswith("FAILED: the measurements contradict their stated standard deviations.")
 
 
-# ------------------------------------------------------------------------------------------------------------ pairs
-
-
 def with_pairs(sigma0: list[float], project: float, *, calibration: bool = False, given: float = 5.0) -> list[str]:
     """Give a sound result pairs with another sigma0, that of the project being what a bundle makes of it."""
     document = case("projected", 2).document
@@ -265,6 +265,7 @@ def test_a_photo_that_is_shifted_as_a_whole_is_named_and_loses_no_points(shift: 
     assert verdict["status"] == LOOK
     assert [text[:40] for text in verdict["look_at"]] == ["P109 all image coordinates of photo 1005"]
     assert [each for each in document["rejected"] if not each["readmitted"]] == []
+    assert [*adjusted(document).cameras] == ["film", "film of photo 1005"]  # exported with a camera of its own
 
 
 def test_photos_with_large_residuals_come_before_those_that_lost_points_worst_first() -> None:
@@ -278,5 +279,5 @@ def test_photos_with_large_residuals_come_before_those_that_lost_points_worst_fi
     summary = {**document["summary"], "image_rms_um": 1.0}
     found = verdict_of(in_tables({**document, "summary": summary, "photos": photos, "rejected": lost}))["look_at"]
     told = [text.partition(":")[0] for text in found if "photo" in text]
-    more = "1 more photo with large residuals like these"
+    more = "1 more photo with large residuals, like the last one"
     assert told == ["photo 2", "photo 4", "photo 3", more, "photo 6", "photo 5"]

@@ -204,12 +204,9 @@ def test_left_handed_control_is_refused_with_the_way_out(use: dict[str, str], fl
     one = swapped(use, flatness)
     with pytest.raises(InputError) as caught:
         one.orient()
-    assert caught.value.exit_code == EXIT_INPUT
     (fault,) = caught.value.faults
-    assert fault.code == "left-handed-control"
-    assert fault.key == "control.axes"
-    assert "upside down" in fault.message
-    assert "left-handed" in fault.message
+    assert (caught.value.exit_code, fault.code, fault.key) == (EXIT_INPUT, "left-handed-control", "control.axes")
+    assert "upside down: control or image coordinates are left-handed" in fault.message
     assert "[north, east, up]" in fault.expected
 
 

@@ -23,6 +23,9 @@ EMPTY: Document = {
 }  # fmt: skip
 MOST_OF_A_KIND = 5  # faults, findings, or notes, of one kind that are told to people
 FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")  # what XML 1.0 cannot hold
+# failures of laying a strip on its control, and what of the control or of mirrored images ends in them
+ON_CONTROL = {"left-handed-control", "left-handed-models", "strip-not-tied", "control-deficient"}
+OF_CONTROL = {"P103", "P401", "P402", "P403", "P405"}
 NUMBER = re.compile(r"\d+")  # in the path of a key: which of a list it is
 
 
@@ -42,13 +45,24 @@ def finding_of(source: Fault | Note | Finding) -> Document:
 
 
 def findings_of(error: InputError | GeometryError) -> list[Document]:
-    """Return what an error carries as plain values: its causes in the data, the failure, and what else they show."""
+    """Return what an error carries as plain values: its causes in the data, the failure, and what else they show.
+
+    Nothing is told twice: not the failure that such a cause always ends in, nor one that repeats the words of a cause.
+    """
     causes = [finding_of(each) for each in error.findings if each.is_error]
     others = [finding_of(each) for each in error.findings if not each.is_error]
     if isinstance(error, InputError):
-        return [*causes, *(finding_of(fault) for fault in error.faults), *others]
-    found = finding_of(Fault(str(error), error.code))
-    return [*causes, found | {"photos": list(error.photos), "points": list(error.points)}, *others]
+        failures = [finding_of(fault) for fault in error.faults]
+    else:
+        named = {"photos": list(error.photos), "points": list(error.points)}
+        failures = [finding_of(Fault(str(error), error.code)) | named]
+    if any(cause["code"] in OF_CONTROL for cause in causes):
+        failures = [each for each in failures if each["code"] not in ON_CONTROL]
+    for cause in causes:
+        repeated = [each for each in failures if each["message"].startswith(cause["message"])]
+        failures = [each for each in failures if each not in repeated]
+        cause["message"] = repeated[0]["message"] if repeated else cause["message"]
+    return [*causes, *failures, *others]
 
 
 def result_findings(document: Document) -> list[Document]:
@@ -97,7 +111,7 @@ def lines_of(findings: Sequence[Document]) -> list[str]:
         elif told[kind] == count[kind]:
             more = count[kind] - MOST_OF_A_KIND
             place = f"{each['file']}: " if kind[2:] and each["file"] else ""
-            lines.append(visible(f"{kind[0]}: {place}{kind[1]} {more} more like these; --format json names all"))
+            lines.append(visible(f"{kind[0]}: {place}{kind[1]} {more} more of this kind; --format json names all"))
     return lines
 
 

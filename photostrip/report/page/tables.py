@@ -12,7 +12,7 @@ from heapq import nlargest
 from math import isfinite
 from typing import Any, NamedTuple
 
-from photostrip.notes import Document
+from photostrip.notes import Document, counted
 from photostrip.report.page.parts import DASH, Column, Table
 
 PRINTED = {"um": "µm", "arcsec": "″", "arcmin": "′", "percent": "%", "ratio": "", "1": ""}  # units
@@ -232,7 +232,8 @@ def column_of(rows: Rows, key: str) -> list[Any]:
 
 def elsewhere(rest: int, what: str, section: str, block: str) -> str:
     """Say how many things are not shown, and where they are."""
-    return f"{rest} more {what}: --section {section}, or `{block}` in result.json"
+    many = what.replace("kind ", "kinds ") if what.startswith("kind ") else f"{what}s"
+    return f"{counted(rest, f'more {what}', f'more {many}')}: --section {section}, or `{block}` in result.json"
 
 
 def taken(rows: Rows, places: Sequence[int]) -> Rows:
@@ -256,7 +257,7 @@ def worst_first(
     """Choose the rows of a table that are shown: all in their order, or the worst, and what to say of the others.
 
     by: a key, or a number for each row: how bad it is.
-    where: what the rows are, which section shows all of them and which block of the result holds them.
+    where: what a row is, which section shows all of them and which block of the result holds them.
     most: how many rows are shown; None: all.
     """
     if most is None or len(rows) <= most:

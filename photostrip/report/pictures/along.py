@@ -32,6 +32,7 @@ MOST_STRIPS = 8  # that have panels
 AXES = ("along", "x"), ("across", "y"), ("up", "z")  # of a strip, and of its polynomials
 LEAST_KM = 2.0
 CURVE_STEPS = 48
+CUT = 10.0  # medians, at which differences stand at the ends of their axis
 
 
 def worst_strips(sizes: Mapping[str, float]) -> list[str]:
@@ -68,6 +69,10 @@ def deformation_pictures(plan: Plan) -> list[Picture]:
         caption += "; circles: strip minus given after the similarity alone"
     if any(isinstance(layer, Line) for panel in panels for layer in panel.layers):
         caption += "; the line: what the polynomial takes out, on the axis of the strip"
+    marks = [(panel.y, layer.at[:, 1]) for panel in panels for layer in panel.layers if isinstance(layer, Marks)]
+    beyond = sum(int(((at < y[0]) | (at > y[1])).sum()) for y, at in marks if y)
+    if beyond:
+        caption += f"; {counted(beyond, 'difference')} beyond {CUT:.0f} times the median at the ends of their axes"
     if len(shown) < len(sizes):
         caption += f". {len(shown)} of {len(sizes)} strips, those with the largest differences"
     words = counted(len(shown), "strip")
@@ -114,10 +119,19 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
                 hints = [f"{words} {plan.ids[after[n]]}: {shift[n, number]:+.3f} m" for n in own]
                 layers.append(Segments(places * (1.0, 0.0), places, f"{role} thin"))
                 layers.append(Marks(places, role, shape, hints, words, 4.0))
+        ranges = [layer.at[:, 1] for layer in layers if isinstance(layer, Line)]
+        ranges += [_held(part) for part in (missed[:, number], shift[:, number])]
         title = f"strip {strip}, {axis}" if len(plan.document["strips"]) > 1 else axis
         labels = f"{unit} along the strip" if strip else f"{unit} from the first photo", "m"
-        panels.append(Panel(layers, title, labels, x=reach))
+        panels.append(Panel(layers, title, labels, x=reach, y=span(np.concatenate(ranges))))
     return panels
+
+
+def _held(values: Floats) -> Floats:
+    """Cut off what is many times as large as most, so that one gross error leaves the others their size."""
+    sizes = np.abs(values[np.isfinite(values)])
+    most = CUT * float(np.median(sizes)) if len(sizes) else 0.0
+    return np.clip(values, -most, most)
 
 
 def _unit(reach: float) -> tuple[float, str]:
@@ -266,7 +280,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
         "zone the mean of all pairs and the scatter of one point: a mean off zero in all pairs alike tells of the "
         "camera, not of the pairs."
     )
-    beyond = int((np.abs(size) > limit)[used | (len(rows) <= MOST_POINTS)].sum())
+    beyond = int((np.abs(size) > limit)[~used | (len(rows) <= MOST_POINTS)].sum())
     if beyond:
         caption += f" At the ends of the axis {counted(beyond, 'parallax', 'parallaxes')} beyond it."
     if len(borders):

@@ -27,6 +27,7 @@ TICKS = 6  # about so many on an axis
 LETTER, LETTER_HEIGHT = 7.2, 12.0  # at most so large
 MOST_HINTS = 1500  # more marks have none
 MOST_DOTS = 10_000  # more are thinned, and the caption says so
+CROWD = 0.4  # power of the number of dots with which their size falls
 CELL = 4.0  # of the picture, that a name, a mark or a line takes
 MOST_NAMED, MOST_TRIED = 60, 400  # names that stand wherever they can; others for which much room is looked for
 SPARE = 12.0  # of the picture, around names that need not stand
@@ -85,7 +86,8 @@ class Axis(NamedTuple):
             return [(value, f"{value:g}") for value in rounded if self.low <= value <= self.high]
         step = nice((self.high - self.low) / TICKS)
         first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
-        return [(n * step, f"{n * step:.6g}") for n in range(first, last + 1)]
+        decimals = max(0, -math.floor(math.log10(step) + 1e-9))
+        return [(n * step, f"{n * step:.{decimals}f}" if n else "0") for n in range(first, last + 1)]
 
 
 class Frame(NamedTuple):
@@ -127,7 +129,8 @@ class Marks:
         known = np.flatnonzero(np.isfinite(self.at).all(axis=1))
         places = frame.places(self.at[known])
         if max(len(known), self.number) > MOST_HINTS:
-            yield svg.dots(places[:: self.every].tolist(), self.size, self.kind)
+            drawn = places[:: self.every].tolist()
+            yield svg.dots(drawn, self.size * min(1.0, (MOST_HINTS / max(len(drawn), 1)) ** CROWD), self.kind)
             return
         for place, row in zip(places.tolist(), known.tolist(), strict=True):
             yield svg.mark(place, self.shape, f"mark {self.kind}", self.hints[row] if self.hints else "", self.size)
@@ -263,7 +266,7 @@ class Names:
                 _take(drawn, layer.course(frame))
         first = self.first or len(places) * (self.first is None and len(places) <= MOST_NAMED)
         if self.beside:
-            _take(taken, places[:first], CELL)
+            _take(taken, places[:first], 0.75 * CELL)
         rest = range(first, len(places))
         for n in (*range(min(first, len(places))), *rest[:: len(rest) // MOST_TRIED + 1]):
             spare = SPARE if n >= first else 0.0
@@ -285,8 +288,8 @@ class Names:
         if not self.beside:
             steps = sorted(((dx, dy) for dx in (-12, 0, 12) for dy in (-10, 0, 10)), key=np.hypot.reduce)
             return [(x - wide / 2 + dx, y + 4.0 + dy) for dx, dy in steps]
-        sides = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
-        return [*sides, *((left, base) for left in (x + 5.0, x - 5.0 - wide) for base in (y - 5.0, y + 13.0))]
+        sides = (x + 9.0, y + 4.0), (x - 9.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
+        return [*sides, *((left, base) for left in (x + 6.0, x - 6.0 - wide) for base in (y - 7.0, y + 15.0))]
 
 
 def _take(cells: NDArray[np.bool_], places: Floats, size: float = 0.0) -> None:
@@ -477,7 +480,7 @@ def chart(
         drawn += _north_arrow(north)
     drawn += _bars(bars, frames[0], top + 10.0)
     thinned = [
-        f" Of {max(len(layer.at), layer.number)} points one in {layer.every} is drawn."
+        f" Of {max(len(layer.at), layer.number)} points one in {layer.every} is drawn; `points` in result.json has all."
         for panel in panels
         for layer in panel.layers
         if isinstance(layer, Marks) and layer.every > 1

@@ -246,7 +246,7 @@ def footprint_pictures(plan: Plan) -> list[Picture]:
         for count, boxes in enumerate(overlaps(corners, plan.map_rows), 1)
         if boxes
     ]
-    kind = "open photo thin" if len(corners) <= 300 else "open photo hair"
+    kind = "open photo thin" if len(corners) <= MANY else "open photo hair"
     layers.append(Areas(corners, kind, [f"photo {photo}" for photo in outlines]))
     called, left_out = shortened(list(outlines))
     many = len(corners) > MOST_NAMED  # then there is room for names outside only
@@ -271,7 +271,7 @@ def area(outline: Floats) -> float:
 
 
 def _square(size: float) -> str:
-    return f"{size / SQUARE_KM:.3g} km²" if size >= SQUARE_KM / 10 else f"{size:.0f} m²"
+    return f"{float(f'{size / SQUARE_KM:.3g}'):g} km²" if size >= SQUARE_KM / 10 else f"{size:.0f} m²"
 
 
 def overlaps(outlines: list[Floats], rows: int = 1) -> list[list[Floats]]:

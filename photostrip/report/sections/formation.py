@@ -74,13 +74,17 @@ def relative(document: Document) -> Iterator[Part]:
         f"{micrometres(worst['max_parallax_um'])} µm at point {worst['max_parallax_point']} of photos "
         f"{worst['left']} and {worst['right']}"
     )
-    redundant = counted(document["summary"]["redundancy"], "redundant point")
+    redundant = counted(sum(column_of(models, "redundancy")), "redundant point")
     yield Facts((("image coordinates", f"{pairs_line(document)}; {redundant}"), ("largest y parallax", largest)))
     pairs = (
         "left+right points_used points_rejected sigma0_um rms_parallax_um max_parallax_um max_parallax_point "
         "condition:2 base:1 base_direction_deg:3 base_inclination_deg:3 strip:4"
     )
-    yield keyed(models, pairs, "q: y parallax of the points used")
+    note = (
+        "q: y parallax of the points used; condition: of the equations, large where the points lie badly; direction, "
+        "inclin.: of the base, in the strip"
+    )
+    yield keyed(models, pairs, note)
     sigmas = zip(*(models.values(f"sigmas_{key}") for key in ELEMENTS), strict=True)
     most = [unit.text(max((each for each in row if each is not None), default=None), 4) for row in sigmas]
     largest_sigma = Field("", f"{unit.name} ", "largest σ", rank=1), most
@@ -177,7 +181,8 @@ def absolute(document: Document) -> Iterator[Part]:
         return
     note = (
         "east, north, up: rms misclosures of the similarity; σ0: their ratio to what is expected from the "
-        f"control and one model; scale: a unit is {'a millimetre' if of_models(document) else 'the first base'}"
+        "control and one model; condition: of the equations, 1 where the control holds all movements alike; "
+        f"scale: a unit is {'a millimetre' if of_models(document) else 'the first base'}"
     )
     keys = (
         "strip control_plan control_height sigma0 redundancy condition:1 misclosure_rms_east misclosure_rms_north "
@@ -225,7 +230,8 @@ def _leverage(document: Document, block: Document) -> str:
         return ""
     share, point, axis = max(shares)
     high = sum(each[0] > HIGH_LEVERAGE for each in shares)
-    text = f" The largest leverage is {share:.2f}, of control point {point} in {axis.upper()}"
+    text = f" The largest leverage is {share:.2f}, of control point {point} in {axis.upper()}: its share in the "
+    text += "polynomial at its own place"
     if high:
         text += f"; {counted(high, 'point')} above {HIGH_LEVERAGE}, where an error hardly shows in the residual"
     return text + "."

@@ -32,6 +32,8 @@ ONE = {
     "position": "camera position coordinate",
     "attitude": "attitude angle",
 }
+AS_STATED = "in units of the stated standard deviations"
+ESTIMATED = "with the standard deviations of the variance components"
 NAMED = 6
 # How a cause is said; any other is that of a camera or of a photo.
 SENTENCES = {
@@ -78,7 +80,9 @@ def stages(document: Document, most: int) -> Iterator[Row]:
         test, out = block["sigma0_test"], sum(block["screening"].get("rejected", {}).values())
         said = "no redundancy to test it" if test["passed"] is None else _verdict(test)
         free = "free network, " if block["free_network"] else ""
-        text = f"{free}σ0 {fixed(block['sigma0'], 3)}, test {said}; {counted(out, 'observation')} rejected"
+        of_components = f"; {fixed(block['sigma0'], 3)} {ESTIMATED}" if len(block["variance_components"]) else ""
+        text = f"{free}σ0 {fixed(test['sigma0'], 3)}, test {said}{of_components}"
+        text += f"; {counted(out, 'observation')} rejected"
         yield "bundle adjustment", text
         yield from taken_up(block, most)
         yield from estimated(document, most)
@@ -89,7 +93,7 @@ def stages(document: Document, most: int) -> Iterator[Row]:
             for key, what in (("control_rms", "control"), ("check_rms", "check points"))
             if classical[key]["plan"] is not None or classical[key]["height"] is not None
         ]
-        yield "polynomials instead", f"{degrees(classical['strips'])}; rms in plan/height {', '.join(left)}"
+        yield "by polynomials", f"{degrees(classical['strips'])}; rms in plan/height {', '.join(left)}"
 
 
 def _verdict(test: Document) -> str:
@@ -121,7 +125,7 @@ def _adjustment(document: Document, units: str) -> Iterator[Part]:
         ("datum", free if block["free_network"] else "given by the observations"),
         ("observations", ", ".join(counted(number, ONE[kind]) for kind, number in block["observations"].items())),
         ("unknowns", f"{parts}; redundancy {block['redundancy']}"),
-        ("σ0", f"{short(block['sigma0'], 5)} in units of the stated standard deviations"),
+        ("σ0", f"{short(block['sigma0'], 5)} {ESTIMATED if len(block['variance_components']) else AS_STATED}"),
         ("test of σ0", said),
         ("gross errors", _screening(block["screening"])),
     )
@@ -135,8 +139,12 @@ def _screening(screening: Document) -> str:
         return "not searched for"
     out = ", ".join(counted(number, ONE[kind]) for kind, number in screening["rejected"].items() if number)
     test = {"tau": "tau test", "baarda": "Baarda's test"}[screening["test"]]
-    level = f"level {screening['alpha']:.2g} for one ray, limit {fixed(screening['limit'], 2)}"
-    return f"{screening['method']}, {test}, {level}: {out or 'none'} rejected, {screening['readmitted']} re-admitted"
+    limits = "; ".join(
+        f"{what} level {screening[f'alpha{of}']:.2g}, limit {fixed(screening[f'limit{of}'], 2)}"
+        for of, what in (("", "a ray"), ("_given", "a given coordinate"))
+    )
+    limits += f"; all over the σ0 found, {fixed(screening['unit'], 3)}" * (screening["unit"] > 1.0)
+    return f"{screening['method']}, {test}, {limits}: {out or 'none'} rejected, {screening['readmitted']} re-admitted"
 
 
 def reliability(document: Document) -> Iterator[Part]:
@@ -167,7 +175,9 @@ def shared_parameters(document: Document) -> Iterator[Part]:
     if shared := tuple(taken_up(block, NAMED)):
         yield Facts(shared)
     if len(block["corrections"]):
-        note = "added to the given positions of a strip; a drift is per unit of time"
+        note = (
+            "added to the given positions of a strip; a drift from photo to photo, or for each unit of the given times"
+        )
         yield keyed(block["corrections"], "name value sigma", note)
     yield from _highly_correlated(block["correlations"], of_cameras=False)
 
@@ -248,13 +258,13 @@ def taken_up(block: Document, most: int) -> Iterator[Row]:
         alike = OF_POSITIONS if cause in OF_POSITIONS else set()
         rivals = dict.fromkeys(rival for row in rows for rival in row["rivals"] if rival not in alike)
         others = listed(f"another {rival}" if rival == cause else rival for rival in rivals)
-        yield "taken up", f"{text}; {others} would explain it nearly as well" if rivals else text
+        yield "cause found", f"{text}; {others} would explain it nearly as well" if rivals else text
 
 
 def _whose(row: Document) -> str:
     if row["cause"] == "control list":
         known = [axis for axis in GROUND_AXES if row[f"shift_{axis}"] is not None]
-        steps = (f"{signed(row[f'shift_{axis}'])} m {axis} (σ {metres(row[f'sigma_{axis}'])})" for axis in known)
+        steps = (f"{signed(row[f'shift_{axis}'])} m {axis} (σ {metres(row[f'sigma_{axis}'])} m)" for axis in known)
         return f"{row['of']}, which lies {', '.join(steps)} beside all else"
     if row["cause"].endswith("photo"):
         return str(row["of"])
@@ -284,19 +294,10 @@ def estimated(document: Document, most: int) -> Iterator[Row]:
 
 def _cameras(block: Document, pixels: dict[str, float]) -> Iterator[tuple[str, float]]:
     """Give what was estimated of each camera, and the largest value in units of its standard deviation."""
-    rows = list(block["calibration"])
-    for camera, group in groupby(rows, key=itemgetter("camera")):
+    for camera, group in groupby(block["calibration"], key=itemgetter("camera")):
         own = list(group)
         said = ", ".join(_parameter(each, pixels.get(camera)) for each in own)
-        pairs = [
-            (value, _name(one), _name(other) + (f" of {other['camera']}" if other["camera"] != camera else ""))
-            for one in own
-            for other, value in zip(rows, one["correlations"], strict=False)
-            if other is not one and value is not None
-        ]
-        if pairs:
-            value, first, second = max(pairs, key=lambda pair: abs(pair[0]))
-            said += f"; largest correlation {value:+.2f}, {first} with {second}; all: --section camera"
+        said += "; with correlations: --section camera" * (len(own) > 1)
         yield f"camera {camera}: added {said}", _largest(own, "value", "sigma")
 
 
@@ -309,7 +310,7 @@ def _parameter(row: Document, pixel: float | None) -> str:
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     more = f", {short(row['value'] / pixel, 3)} px" if pixel and row["unit"] == "mm" else ""
     more += "" if row["significant"] else ", not significant"
-    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{more})"
+    return f"{short(row['value'])}{unit} to {_name(row)} (σ {short(row['sigma'], 2)}{unit}{more})"
 
 
 def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:
@@ -317,7 +318,7 @@ def _positions(rows: Sequence[Document]) -> Iterator[tuple[str, float]]:
         own = list(corrections)
         said = []
         for kind, parts in groupby(own, key=itemgetter("kind")):
-            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])})" for r in parts)
+            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])} m)" for r in parts)
             said.append(f"from the first to the last {steps} more" if kind == "drift" else steps)
         yield f"camera positions of {group}: added {'; '.join(said)}", _largest(own, "whole", "whole_sigma")
 

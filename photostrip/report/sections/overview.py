@@ -99,7 +99,7 @@ def _stages(document: Document, most: int) -> Rows:
     checked = document["counts"]["points_checked"]
     if checked["across"] or checked["none"]:  # an error along the base would not show
         text = f"{counted(checked['across'], 'point')} checked only across the base, {checked['none']} not at all"
-        yield "unchecked", f"{text}; {checked['along']} along it too"
+        yield "unchecked", f"{text}; {counted(checked['along'], 'point')} along it too"
 
 
 def _worst(document: Document) -> Rows:
@@ -138,7 +138,7 @@ def _notes(notes: Iterable[Document], most: int) -> Iterator[Part]:
     for first, *rest in list(kinds.values())[:most]:
         yield Words(sentence_of(first) + _likewise(rest), mark="-")
     if len(kinds) > most:
-        yield Words(elsewhere(len(kinds) - most, "kinds of notes", "notes", "notes"))
+        yield Words(elsewhere(len(kinds) - most, "kind of notes", "notes", "notes"))
 
 
 def _likewise(rest: Sequence[Document]) -> str:

@@ -38,7 +38,7 @@ PARTS = "plan", "height"
 IDS_NAMED = 12
 WORST_POINTS = 8
 FAILED_SHOWN = 3  # folds of a cross-validation that could not be adjusted
-MOST_MARKS = 100  # marks: a page of a large block can still be mailed
+MOST_MARKS, WORST_MARKS = 100, 50  # of given points: more are summed up point by point, with the worst of them
 UNTESTED = dict.fromkeys(("plan", "height", "p_plan", "p_height"))
 MEANING = (
     "σ: of the adjusted point; d/σ: difference over its standard deviation, with that of the given point (in plan by "
@@ -67,7 +67,7 @@ def control(document: Document, most: int | None = None) -> Iterator[Part]:
 def given_table(document: Document, given: Rows, role: str, most: int | None) -> Table:
     """Return the table of given points of a role with their differences, the worst first."""
     summary = document["summary"]
-    shown, note = worst_first(given, "normalised", ("points", role, "control"), most)
+    shown, note = worst_first(given, "normalised", ("point", role, "control"), most)
     used = Field("use"), [_used(row) for row in shown]
     known = (size for size, out in zip(given.values("normalised"), given.values("rejected"), strict=True) if not out)
     plan, height = summary[role]["plan"], summary[role]["height"]
@@ -141,7 +141,7 @@ def check(document: Document, most: int | None = None) -> Iterator[Part]:
     points = document["points"].where(role="check")
     known, tested = ({row["id"]: row for row in rows} for rows in (points, tests["points"]))
     chances = [-_chance(tested[name]) if name in tested else -1.0 for name in given.values("id")]
-    shown, note = worst_first(given, chances, ("points", "check", "control"), most)
+    shown, note = worst_first(given, chances, ("point", "check", "control"), most)
     quantities = points.quantities | given.quantities | tests["points"].quantities
     blank = dict.fromkeys(quantities)
     rows = [blank | known.get(row["id"], {}) | row | UNTESTED | tested.get(row["id"], {}) for row in shown]
@@ -166,7 +166,7 @@ def cross_validation(document: Document, most: int | None = None) -> Iterator[Pa
     for fold in failed[:FAILED_SHOWN]:
         yield Words(f"not without {listed(fold['left_out'], IDS_NAMED)}: {fold['reason']}", "look", "-")
     if len(rows):
-        where = ("points", "cross-validation", "cross_validation")
+        where = ("point", "cross-validation", "cross_validation")
         shown, note = worst_first(rows, [-_chance(row) for row in rows], where, most)
         seen = {f"z_{part}": (block[part]["ratio"], block[part]) for part in PARTS}
         explained = most is not None and document["summary"]["check"]["plan"]["count"]  # above, at the check points
@@ -254,7 +254,8 @@ def images(document: Document) -> Iterator[Part]:
     columns = {"photos": "id image_rms_um points strip:1 *:2", "points": "id image_rms_um rays role:1 *:2"}
     for block, keys in columns.items():
         rows = document[block]
-        yield keyed(taken(rows, largest_of(rows, "image_rms_um", WORST_POINTS)), keys, f"the worst {block}")
+        worst = taken(rows, largest_of(rows, "image_rms_um", WORST_POINTS))
+        yield keyed(worst, keys, f"the worst {len(worst)} of {len(rows)} {block}")
 
 
 def precision(document: Document) -> Iterator[Part]:
@@ -277,7 +278,7 @@ def precision(document: Document) -> Iterator[Part]:
     yield _least_precise(document["points"])
     if len(block["along"]):
         keys = "photo distance points plan height centre_plan:1 centre_height:1"
-        note = "rms of the points nearest to each photo, and its perspective centre"
+        note = "rms of the points nearest to each photo, and its perspective centre; distance: from the first photo"
         yield keyed(block["along"], f"{keys} strip:2" if len(document["strips"]) > 1 else keys, note)
 
 
@@ -299,7 +300,9 @@ def _check(check: Document | None) -> Iterator[tuple[str, str]]:
     yield "check points", f"{'; '.join(parts)} in units of their standard deviations"
     for test in check["tests"]:
         count = counted(test["coordinates"], "coordinate")
-        text = f"chi-square {fixed(test['squares'], 1)} of {count}, p = {100 * test['p']:.1f} %"
+        text = (
+            f"chi-square {fixed(test['squares'], 1)} for {count}, probability of a larger one {100 * test['p']:.1f} %"
+        )
         yield "all together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}", text
 
 
@@ -325,10 +328,11 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
             continue
         yield Facts(tuple(_summed(own, f"{unit} {decimals}")))
         lengths = [mark["length"] for mark in own]
-        shown, note = worst_first(own, lengths, ("marks", "marks", "residuals"), most)
+        shown, note = worst_first(own, lengths, ("mark", "marks", "residuals"), most)
         if len(shown) > MOST_MARKS:
-            shown = nlargest(MOST_MARKS, own, key=itemgetter("length"))
-            note = f"the worst {MOST_MARKS} of {len(own)}; `residuals` in result.json has all"
+            yield _by_point(own, unit, decimals)
+            shown = nlargest(WORST_MARKS, own, key=itemgetter("length"))
+            note = f"the worst {WORST_MARKS} of {len(own)}; `residuals` in result.json has all"
         tested = any(mark["test"] is not None for mark in shown)
         columns = (
             *map(Field, ("point", "role", "photo")),
@@ -338,6 +342,23 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
         )
         below = note_of(note, "test: the larger of both over its standard deviation" if tested else "")
         yield tabulated(columns, ([mark[column.key] for column in columns] for mark in shown), below)
+
+
+def _by_point(marks: Sequence[Document], unit: str, decimals: int) -> Table:
+    """Sum up the marks of each given point, in the order of the list."""
+    columns = (
+        *map(Field, ("point", "role")),
+        Field("marks", " 0"),
+        *fields("rms largest", f"{unit} {decimals}"),
+        Field("photo", head="on"),
+    )
+    rows = []
+    for _, group in groupby(marks, itemgetter("point")):
+        own = list(group)
+        worst = max(own, key=itemgetter("length"))
+        rms = (sum(mark["length"] ** 2 for mark in own) / (2 * len(own))) ** 0.5
+        rows.append([worst["point"], worst["role"], len(own), rms, worst["length"], worst["photo"]])
+    return tabulated(columns, rows, "rms of a coordinate; largest: the mark farthest from its point")
 
 
 def _marks(document: Document) -> Iterator[Document]:
@@ -379,7 +400,8 @@ def _summed(marks: Sequence[Document], form: str) -> Iterator[tuple[str, str]]:
 def rejected(document: Document) -> Iterator[Part]:
     rows = standing_rejections(document)
     keys = "point photo+other_photo test value limit unit reason:1"
-    yield keyed(rows, keys) if len(rows) else Words("Nothing was rejected.")
+    note = "value: of the test, beyond its limit"
+    yield keyed(rows, keys, note) if len(rows) else Words("Nothing was rejected.")
 
 
 def standing_rejections(document: Document) -> Rows:

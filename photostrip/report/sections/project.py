@@ -135,8 +135,10 @@ def counts(document: Document) -> Iterator[Part]:
 def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
     """Count photos, points and measurements; scale, height and base."""
     counts, strips, summary, unit = document["counts"], document["strips"], document["summary"], angle_unit(document)
-    flown = counted(counts["strips"], "strip") if counts["strips"] else "no strip"
-    yield "photos", f"{counts['photos']} in {flown}, {counted(counts['models'], 'model')}"
+    flown = f"in {counted(counts['strips'], 'strip')}, {counted(counts['models'], 'model')}"
+    if counts["strips"] in {0, counts["photos"]}:
+        flown = "in no strip"
+    yield "photos", f"{counts['photos']} {flown}"
     text = "{points}: {new_points} new, {control_points} control ({control_plan} in plan, {control_height} in height), "
     yield "points", f"{text}{{check_points}} check".format(**counts)
     if of_models(document):
@@ -185,7 +187,7 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     for block in document.get("polynomials", []):
         if block["asked"] == "auto":
             text = chosen_degrees(document["polynomial_evidence"].where(strip=block["strip"]))
-            how = "F is the ratio of the gain over the degree before, p its probability by chance"
+            how = "F: variance ratio of what it gains over the degree before; p: probability of such a gain by chance"
             label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
             yield label, text if text == NO_DEGREE else f"{text}; {how}"
     if "relative" in settings:

@@ -57,7 +57,7 @@ def verdict(document: Document, most: int | None = None) -> Iterator[Part]:
     for number, text in shown:
         yield Words(text, mark=f"{number}.", names=_named(document, text))
     if len(look_at) > len(shown):
-        yield Words(elsewhere(len(look_at) - len(shown), "things", "verdict", "verdict"))
+        yield Words(elsewhere(len(look_at) - len(shown), "thing", "verdict", "verdict"))
     if len(document["tolerances"]):
         yield keyed(document["tolerances"], "name value limit unit passed")
 
@@ -82,14 +82,11 @@ def names_of(said: Document) -> tuple[tuple[str, str], ...]:
 
 
 def findings(document: Document) -> Iterator[Part]:
-    """Give each finding with its numbers and its cure."""
+    """Give each finding with its cure; its numbers by themselves stand in result.json."""
     for each in document.get("findings", ()):
         place = before(each["file"], each["line"], each["column"])
         text = f"{_title(each)} ({_word(each)}): {place}{each['message']}."
         yield Words(text, _colour(each), mark="-", names=names_of(each))
-        if each["evidence"]:
-            numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in each["evidence"].items())
-            yield Words(f"Evidence: {numbers}.", "", " ")
         if _cure(each):
             yield Words(_cure(each), "", " ")
 
@@ -102,7 +99,7 @@ def cures(document: Document, most: int) -> Iterator[Part]:
     for each in shown:
         yield Words(f"{_title(each)} ({_word(each)}). {_cure(each)}".strip(), _colour(each), "-")
     if len(rows) > len(shown):
-        yield Words(elsewhere(len(rows) - len(shown), "findings", "findings", "findings"))
+        yield Words(elsewhere(len(rows) - len(shown), "finding", "findings", "findings"))
 
 
 def _title(finding: Document) -> str:

@@ -29,7 +29,7 @@ for (const table of document.querySelectorAll("main table")) {
   });
   if (rows.length < 10) continue;
   const field = document.createElement("input"), count = document.createElement("output"), line = document.createElement("p");
-  Object.assign(field, { type: "search", placeholder: "filter the rows", ariaLabel: `filter ${rows.length} rows` });
+  Object.assign(field, { type: "search", placeholder: `filter ${rows.length} rows`, ariaLabel: `filter ${rows.length} rows` });
   line.className = "filter";
   line.append(field, " ", count);
   table.parentNode.before(line);

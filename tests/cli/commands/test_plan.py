@@ -339,8 +339,9 @@ def test_a_rule_for_make(answer: Answer, call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_picture_of_a_strip(answer: Answer, call: Call, tmp_path: Path) -> None:
-    target = tmp_path / "strip.svg"
+@pytest.mark.parametrize("ending", ["svg", "html"])
+def test_the_picture_of_a_strip(answer: Answer, call: Call, tmp_path: Path, ending: str) -> None:
+    target = tmp_path / f"strip.{ending}"
     keys = ("models=3", "methods=[similarity]")
     assert answer("plan", "strip", *(f"--set={key}" for key in keys), "-q", "-o", str(target)) == ""
     drawn = target.read_text(encoding="utf-8")

@@ -206,11 +206,11 @@ def test_a_kind_is_told_by_examples_and_a_count() -> None:
     lines = lines_of([finding_of(each) for each in (*SHARED, OUTSIDE)])
     assert len(lines) == MOST_OF_A_KIND + 2
     assert lines[MOST_OF_A_KIND - 1].startswith("warning: P301 point 4 stands")
-    assert lines[MOST_OF_A_KIND] == "warning: P301 4422 more like these; --format json names all"
+    assert lines[MOST_OF_A_KIND] == "warning: P301 4422 more of this kind; --format json names all"
     assert lines[-1].startswith("error: P402 ")
     notes = [finding_of(Note("unused", f"row {number} is not used")) for number in range(9)]
     assert len(lines_of(notes)) == MOST_OF_A_KIND + 1
-    assert lines_of(notes)[-1] == "warning: unused 4 more like these; --format json names all"
+    assert lines_of(notes)[-1] == "warning: unused 4 more of this kind; --format json names all"
 
 
 def test_faults_are_told_by_column_and_by_the_key_of_a_list() -> None:
@@ -222,7 +222,7 @@ def test_faults_are_told_by_column_and_by_the_key_of_a_list() -> None:
     lines = told(*rows, more)
     assert lines[:MOST_OF_A_KIND] == [f"error: o.csv:{line}:9: x: no number" for line in range(1, 6)]
     assert lines[MOST_OF_A_KIND:] == [
-        "error: o.csv: not-a-number 195 more like these; --format json names all",
+        "error: o.csv: not-a-number 195 more of this kind; --format json names all",
         "error: o.csv: and 7 more faults in this file",
     ]
     assert len(told(*(Fault("2 points", "few", "p.yaml", key=f"strips[0].photos[{i}]") for i in range(40)))) == 6

@@ -50,7 +50,7 @@ def test_what_of_the_verdict_is_not_shown_is_counted(count: int, more: int) -> N
     document = copy.deepcopy(saved())
     document["verdict"]["look_at"] = [f"reason {number}" for number in range(count)]
     said = texts(verdict(document, 6))
-    rest = f"{more} more things: --section verdict, or `verdict` in result.json"
+    rest = f"{more} more {'thing' if more == 1 else 'things'}: --section verdict, or `verdict` in result.json"
     assert [text for text in said if "`verdict`" in text] == [rest] * (more > 0)
     assert sum(text.startswith("reason ") for text in said) == 6
     assert sum(text.startswith("reason ") for text in texts(verdict(document))) == count
