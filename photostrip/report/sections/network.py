@@ -294,20 +294,10 @@ def estimated(document: Document, most: int) -> Iterator[Row]:
 
 def _cameras(block: Document, pixels: dict[str, float]) -> Iterator[tuple[str, float]]:
     """Give what was estimated of each camera, and the largest value in units of its standard deviation."""
-    rows = list(block["calibration"])
-    for camera, group in groupby(rows, key=itemgetter("camera")):
+    for camera, group in groupby(block["calibration"], key=itemgetter("camera")):
         own = list(group)
         said = ", ".join(_parameter(each, pixels.get(camera)) for each in own)
-        pairs = [
-            (value, _name(one), _name(other) + whose * (other["camera"] != camera))
-            for one in own
-            for other, value in zip(rows, one["correlations"], strict=False)
-            for whose in [f" of {other['camera'].removeprefix('of ')}"]
-            if other is not one and value is not None
-        ]
-        if pairs:
-            value, first, second = max(pairs, key=lambda pair: abs(pair[0]))
-            said += f"; largest correlation {value:+.2f}, {first} with {second}; all: --section camera"
+        said += "; with correlations: --section camera" * (len(own) > 1)
         yield f"camera {camera}: added {said}", _largest(own, "value", "sigma")
 
 
