@@ -239,6 +239,8 @@ class _Search:
                 done = found
             elif isinstance(worst, WrongRays):
                 done = self._without_rays(done, worst)
+            elif worst[0].kind == POSITION and (reordered := self._reordered(done.selection)) is not None:
+                done = self.adjust(supported(self.problem, reordered))
             else:
                 done = self._without_given(done, worst)
 
