@@ -18,6 +18,7 @@ from photostrip.network.problem import CALIBRATION, BundleProblem, BundleSetting
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
+from photostrip.result.given import COUNTED, PLACES
 from photostrip.result.numbers import PER_RADIAN, attributes, record, rms
 from photostrip.result.points import ImageResiduals
 from photostrip.result.table import Table
@@ -105,7 +106,6 @@ def bundle_of(result: Result) -> Document:
         ),
         "calibration": Table.of_rows("bundle.calibration", _calibration(result, found)),
         "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
-        "positions": Table.of_rows("bundle.positions", _positions(found)),
         "corrections": Table.of_rows("bundle.corrections", _corrections(found)),
         "taken_up": Table.of_rows("bundle.taken_up", _taken_up(found)),
     }
@@ -190,18 +190,30 @@ def _at_corner(camera: Camera, measured: Floats) -> Floats:
     return np.asarray(np.hypot(*moved.transpose(1, 0, 2)).max(axis=1), float)
 
 
-def _positions(found: Bundle) -> Iterator[Document]:
-    """Return the differences at camera positions, adjusted minus given."""
-    problem, given = found.screened.problem, found.screened.problem.positions
-    sigma = np.where(np.isfinite(given.sigma), given.sigma, np.nan)
-    moved = np.where(np.isfinite(given.sigma), found.screened.solution.position_residuals, np.nan)
-    (redundancy,) = (
-        (each.redundancy for each in found.groups if each.kind == reliability.POSITION) if len(sigma) else ((),)
-    )
-    for row, photo in enumerate(given.photo.tolist()):
-        values = (("d", moved[row]), ("sigma", sigma[row]), ("redundancy", redundancy[row]))
-        of_axes = {f"{key}_{axis}": size for key, of in values for axis, size in zip(GROUND_AXES, of, strict=True)}
-        yield {"photo": problem.photo_name(photo), **of_axes}
+def positions_of(result: Result) -> Document:
+    """Return the table ``positions`` under its key: camera positions, adjusted minus given; nothing without any."""
+    if result.bundle is None or not len(result.bundle.block.problem.positions):
+        return {}
+    found, stated = result.bundle.screened, result.bundle.block.problem.positions.sigma
+    given, used = np.isfinite(stated), np.isfinite(found.problem.positions.sigma)
+    cofactor = np.diagonal(found.precision.position_residuals, axis1=1, axis2=2)
+    share = np.where(used, cofactor, stated**2 - cofactor) / stated**2  # of one that was left out: minus the adjusted
+    with np.errstate(invalid="ignore", divide="ignore"):
+        over = found.solution.position_residuals / (stated * np.sqrt(share) * found.limit.unit)
+    values = {
+        "d": np.where(given, found.solution.position_residuals, np.nan),
+        "normalised": np.where(given & (share >= UNCONTROLLED), over, np.nan),
+        "sigma": np.where(given, stated, np.nan),
+        "redundancy": np.where(used, share, np.nan),
+    }
+    words = np.array(("", *COUNTED), object)
+    columns = {
+        "photo": [found.problem.photo_name(photo) for photo in found.problem.positions.photo.tolist()],
+        "use": words[given @ PLACES],
+        "rejected": words[(given & ~used) @ PLACES],
+        **{f"{key}_{axis}": size[:, k] for key, size in values.items() for k, axis in enumerate(GROUND_AXES)},
+    }
+    return {"positions": Table.of("positions", columns)}
 
 
 def _corrections(found: Bundle) -> Iterator[Document]:
