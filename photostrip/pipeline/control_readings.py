@@ -160,7 +160,7 @@ def find_reading(
     smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
     ways = [(each, number) for each in READINGS for number in (smaller if each.of_list else [None])]
     best, least, price = None, np.inf, float(np.log(len(ways) / LEVEL))
-    if as_given is not None:
+    if as_given is not None and not as_given.is_buried:
         if _excess(as_given) < price and not as_given.found.out:
             return None
         least = _cost(as_given, AS_GIVEN) - price
@@ -289,7 +289,8 @@ def named(better: Better, as_given: OnControl | None, held: HeldStrip, frames: S
     before = "cannot be laid on its control as it is given"
     if as_given is not None:
         before = f"is {_size(as_given):.3g} m off its control as it is given"
-    head = f"strip {strip} {before}, and {_size(tried):.2g} m if"
+        before = "would lie below its control as it is given" if as_given.is_buried else before
+    head = f"strip {strip} {before}, and {_size(tried):.2g} m off it if"
     if reading.distance != 1.0 and isinstance(held.stage, FormedPhotos):
         return _of_distance(held.stage.strip, reading.distance, head, numbers)
     if reading.mirrored:
@@ -311,7 +312,7 @@ def axes_to_write(frames: Sequence[GroundFrame], order: tuple[int, int, int], li
 
 
 def of_mirrored(
-    findings: Sequence[Finding], inputs: Inputs, frames: Sequence[GroundFrame], right: str
+    findings: Sequence[Finding], inputs: Inputs, frames: Sequence[GroundFrame], *, in_place: bool, others_fit: bool
 ) -> list[Finding]:
     """Name what may have mirrored strips, all of them together (P103, P401).
 
@@ -320,7 +321,7 @@ def of_mirrored(
     format that holds the points one way only.
 
     findings: of each strip that fits as its mirror image, with the control that it shows.
-    right: what tells that the axes of the control are right; empty where nothing does.
+    in_place, others_fit: whether the axes of the control are right, as its place or other strips tell.
     """
     if not findings:
         return []
@@ -328,7 +329,8 @@ def of_mirrored(
     lists = np.unique(inputs.control.frame[locate(points, inputs.control.ids)]).tolist()
     hands = {round(float(np.linalg.det(np.eye(3)[list(frames[number].order)]))) for number in lists}
     causes, told = _of_photos([strip for strip in inputs.strips if strip.id in strips], inputs)
-    right = right or ("its lists, of both hands, agree" if len(hands) > 1 else "")
+    right = "its lists, of both hands, agree" if len(hands) > 1 else ""
+    right = "other strips fit it as it is" if others_fit else "it lies where its crs is" if in_place else right
     by_control = not (right or told)
     if by_control:
         two = "two of X, Y, Z" if "x" in frames[lists[0]].axes else "east and north"
@@ -338,6 +340,8 @@ def of_mirrored(
     why = "their format holds the points only so" if told else right and f"the control is right: {right}"
     message = f"{head}{findings[0].message}: {', or '.join(causes)}{why and f' ({why})'}"
     fix = f"write {', or '.join(causes.values())}" + ("; all fit alike" if len(causes) > 1 else "")
+    if others_fit:
+        fix = "correct the rows of its photos, and nothing that the project says of all"
     key = "control" if by_control else "models" if inputs.models is not None else "observations"
     return [found("P401" if by_control else "P103", message, fix, findings[0].evidence, strips=strips, key=key)]
 

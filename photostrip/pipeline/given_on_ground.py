@@ -139,9 +139,13 @@ def of_strips(
     mirrored = [finding for each in all_strips for finding in each.mirrored if control.axes_are_right is not False]
     shown = locate([name for each in mirrored for name in each.points], control.points.ids)
     confirmed = frozenset[int]().union(*(each.confirmed for each in all_strips))
-    right = "other strips fit it as it is" if confirmed & set(control.points.frame[shown].tolist()) else ""
-    right = "it lies where its crs is" if control.axes_are_right else right
-    whole = control_readings.of_mirrored(mirrored, control.inputs, control.frames, right)
+    whole = control_readings.of_mirrored(
+        mirrored,
+        control.inputs,
+        control.frames,
+        in_place=control.axes_are_right is True,
+        others_fit=not confirmed.isdisjoint(control.points.frame[shown].tolist()),
+    )
     whole += [finding for each in all_strips for finding in each.whole]
     return whole, [finding for each in all_strips for finding in each.slips]
 
