@@ -364,10 +364,15 @@ class OnControl:
         axis = up(stage) if isinstance(stage, FormedPhotos) else np.array([0.0, 0.0, 1.0])
         return bool(self.oriented.absolute.similarity.rotation[2] @ axis > LEAST_DOWN)
 
+    @property
+    def centers(self) -> Floats:
+        """Perspective centres (n, 3) of its photos, intermediate frame, metres."""
+        return self.oriented.absolute.similarity(self.oriented.formed.centers)
+
     @cached_property
     def is_buried(self) -> bool:
         """Whether its photos do not look down, and their perspective centres lie below the control."""
-        heights = self.oriented.absolute.similarity(self.oriented.formed.centers)[:, 2]
+        heights = self.centers[:, 2]
         return self.looks_down is False and bool(np.median(heights) < np.median(self.oriented.at_control[:, 2]))
 
     @cached_property

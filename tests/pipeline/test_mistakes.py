@@ -18,7 +18,7 @@ from photostrip.errors import PhotostripError
 from photostrip.foreign.simulated import project_files
 from photostrip.notes import LOST_SAY
 from photostrip.pipeline import gate
-from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.inputs import CameraPositions, Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.plausibility import KINDS
 from photostrip.simulation import Control, Flight, Gnss, Ground, Image, Spec, Terrain, simulate
@@ -261,6 +261,21 @@ def test_each_cure_of_a_mirrored_strip_is_told_and_cures_it(
     for each in cures:
         assert main([*run, "--set", each, "--set", "tolerances={check_rms_xy: 0.3, check_rms_z: 1.0}"]) == 0
         assert "P204" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("order", "both"), [([1, 0, 2], False), ([0, 1, 2], True)], ids=["control", "photos"])
+def test_camera_positions_tell_exchanged_control_from_mirrored_photos(order: list[int], *, both: bool) -> None:
+    made = simulate(replace(simulation("local").spec, gnss=Gnss()))
+    assert made.gnss is not None
+    inputs, full = inputs_of(made), np.ones(made.gnss.shape)
+    xy = inputs.observations.xy * ([1, -1] if both else [1, 1])
+    positions = CameraPositions(
+        made.truth.photo_ids, inputs.frames[0], made.gnss, full > 0, 0.1 * full, 0.0 * full[:, 0]
+    )
+    inputs = replace(inputs, observations=replace(inputs.observations, xy=xy), positions=positions)
+    (finding,) = findings_of(replace(inputs, control=replace(inputs.control, enu=inputs.control.enu[:, order])))
+    assert ("`control[0].axes: [north, east, up]` and `camera_positions.axes" in finding.fix) == both
+    assert ("observations" in finding.fix) == both
 
 
 @pytest.mark.parametrize(
