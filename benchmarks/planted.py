@@ -980,7 +980,7 @@ MISTAKES = (
     Mistake("camera positions below ground",
             of_positions(lambda case, enu: enu - [0.0, 0.0, 1.2 * case.spec.flying_height]),
             ("P204",), 1, with_positions),
-    Mistake("their heights in feet", of_positions(lambda _, enu: enu / [1.0, 1.0, FOOT]), ("P205",), 1, with_positions),
+    Mistake("their heights in feet", of_positions(lambda _, enu: enu / [1.0, 1.0, FOOT]), ("P405",), 1, with_positions),
     Mistake("one height of them off by half", of_positions(one_high), ("P205", *OFF), 1, with_positions),
     Mistake("two camera positions exchanged", of_positions(neighbours_swapped),
             ("P208", "P206", "P207", *OFF), 1, with_positions),

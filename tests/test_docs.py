@@ -166,4 +166,4 @@ def test_the_site_has_tables_and_fences_that_name_a_kind_alone() -> None:
     for name in TABLES:
         assert f"\n<!-- table: {name} -->\n" in "".join(page.read_text(encoding="utf-8") for page in pages())
     assert "| `grubbs_alpha` | 0.05 | Probability of" in for_the_site("<!-- table: project -->")
-    assert "| P401 | **control axes exchanged, or photos mirrored** |" in for_the_site("<!-- table: findings -->")
+    assert "| P401 | **axes exchanged, or photos mirrored** |" in for_the_site("<!-- table: findings -->")

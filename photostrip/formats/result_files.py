@@ -42,7 +42,7 @@ BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
 LINES = 8000  # that are written at a time: all together take more memory than the result
 IDS = {"points": "point", "control": "point", "ties": "point", "not_determined": "point", "photos": "photo"}
 # Tables whose files have other names: these are those of measured and given coordinates, and may stand beside them.
-FILES = {"control": "given_points", "fiducials": "interior", "models": "pairs"}
+FILES = {"control": "given_points", "fiducials": "interior", "models": "pairs", "positions": "camera_positions"}
 WORDS = {"findings", "notes", "tolerances"}  # tables that hold no measurements
 
 

@@ -47,6 +47,7 @@ from photostrip.network.testing import (
 )
 from photostrip.points import take_rows
 from photostrip.rejection import Rejection
+from photostrip.statistics import TEST_LEVEL
 from photostrip.strip.control_screening import LARGEST_SHARE
 from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
 
@@ -70,6 +71,7 @@ class ScreenedBundle:
     common: tuple[Hypothesis, ...] = ()  # what groups of observations share, taken up as unknowns
     # given coordinates beyond the limit that stay: without them the adjustment fails, or half of the control would go
     held: tuple[Rejection, ...] = ()
+    doubted: tuple[Rejection, ...] = ()  # others, that are beyond it by the stated standard deviations
 
     @classmethod
     def of(
@@ -156,7 +158,7 @@ def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
         done = search.clean(supported(search.problem, less))
     done = search.with_most_control(done)
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
-    done = replace(done, rejections=tuple(search.log(done)), held=held)
+    done = replace(done, rejections=tuple(search.log(done)), held=held, doubted=search.doubted(done))
     return replace(done, rounds=search.rounds, common=tuple(search.common))
 
 
@@ -237,6 +239,8 @@ class _Search:
                 done = found
             elif isinstance(worst, WrongRays):
                 done = self._without_rays(done, worst)
+            elif worst[0].kind == POSITION and (reordered := self._reordered(done.selection)) is not None:
+                done = self.adjust(supported(self.problem, reordered))
             else:
                 done = self._without_given(done, worst)
 
@@ -564,6 +568,16 @@ class _Search:
                 for row, axis in np.argwhere(value > limit.given).tolist()
             ]
         return rays, sorted(given, key=lambda each: -each.value)
+
+    def doubted(self, done: ScreenedBundle) -> tuple[Rejection, ...]:
+        """Given coordinates that only the sigma0 found keeps within the limit, where it is not far from what is stated.
+
+        A wrong one enlarges sigma0, which hides it.
+        """
+        if self.rough or done.limit.unit == 1.0 or not reliability.sigma0_test(done.solution, TEST_LEVEL).passed:
+            return ()
+        by_stated = replace(done, limit=done.limit._replace(unit=1.0))
+        return tuple(each for each in self.tested(by_stated)[1] if not self.holds(each))
 
     def holds(self, given: Rejection) -> bool:
         return (given.kind, given.row, given.axes[0]) in self.held

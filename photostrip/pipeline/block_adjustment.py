@@ -132,9 +132,13 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
             text, photos, points = _contradiction(problem, each, early)
             text += "; not used"
             yield Note("control-rejected" if points else "position-rejected", text, photos=photos, points=points)
-    for each in bundle.screened.held:
+    screened, unit = bundle.screened, bundle.screened.limit.unit
+    why = "without it the adjustment fails, or half of the control would be out"
+    kept = [(each, why) for each in screened.held]
+    kept += [(each, f"by the sigma0 found the test value is {each.value / unit:.2f}") for each in screened.doubted]
+    for each, why in kept:
         text, photos, points = _contradiction(problem, each, early)
-        text += "; it was used: without it the adjustment fails, or half of the control would be out"
+        text += f"; it was used: {why}"
         yield Note("control-doubtful" if points else "position-doubtful", text, photos=photos, points=points)
 
 
@@ -204,7 +208,7 @@ def _in_one_network(
 
 def _calibrated(observations: PhotoPoints, bundle: Bundle) -> PhotoPoints:
     """Image coordinates with the calibration that was found."""
-    problem = bundle.block.problem
+    problem = bundle.screened.problem  # with the cameras that the last search has freed
     if not len(bundle.screened.solution.common):
         return observations
     photo = bundle.start.rows_of(observations.photo_ids)[observations.photo]
@@ -235,9 +239,10 @@ def _strip(
     models = np.where(known, formed.model_count[at], 0)
     shape = np.where(known[:, None], formed.xyz[at], np.nan)
     control_at = np.searchsorted(number, formed.point[strip.control_rows])
-    at_rows = np.searchsorted(number, observations.point[rows])
     oriented = strip.of_photos.strip.oriented(centers, rotations)
-    resection = of_known_photos(observations.xy, xyz, position[rows], oriented, rows, at_rows)
+    residuals = np.empty_like(observations.xy)
+    residuals[used] = solution.image_residuals
+    resection = of_known_photos(residuals[rows], position[rows], oriented)
     return replace(
         strip,
         control_rows=np.minimum(control_at, len(number) - 1),
@@ -603,7 +608,10 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
 
 
 def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
-    """Estimate variance components, then search for gross errors once more with the standard deviations found."""
+    """Estimate variance components, then search for gross errors once more with the standard deviations found.
+
+    That search may take up more of what observations share: the result is that of all that was taken up.
+    """
     found: tuple[reliability.Component, ...] = ()
     block, screened = before.block, before.screened
     problem, level, done = block.problem, block.level, screened
@@ -618,9 +626,12 @@ def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
         done = snooping.screen_bundle(chosen, screened.selection, quiet)
     block = replace(block, problem=problem)
     final = snooping.screen_bundle(problem, screened.selection, settings.bundle, block.kept)
+    for shared in final.common:
+        block = replace(block, problem=taken_up(block.problem, shared))
     known = {(each.kind, each.row) for each in screened.rejections}
     again = (each for each in final.rejections if (each.kind, each.row) not in known)
-    final = replace(final, rejections=(*screened.rejections, *again), common=screened.common)
+    common = *screened.common, *final.common
+    final = replace(final, rejections=(*screened.rejections, *again), common=common)
     return before._replace(block=block, screened=final, components=found)
 
 

@@ -211,23 +211,31 @@ def closer_look(
     def toward(one: str, other: str) -> tuple[complex, complex] | None:
         if not points:
             points.append(ideal(observations, cameras, settings))
-        focal = strip.camera.principal_distance
-        try:
-            with np.errstate(all="ignore"):
-                pairs = collect_pairs(points[0], [one, other], focal)
-                if len(pairs.pair) < LEAST_POINTS:
-                    return None
-                oriented, converged = orient_unchecked(pairs)
-                doubtful = unusable_pairs(oriented, converged)
-        except (GeometryError, np.linalg.LinAlgError):
+        oriented = oriented_pair(points[0], (one, other), strip.camera.principal_distance)
+        if oriented is None:
             return None
-        if doubtful[0] or not oriented.sigma0[0] < PAIR_SIGMA0 * focal:
-            return None
-        base, turn = (each[0] for each in oriented.relative)
+        base, turn = oriented
         back = -base @ turn
         return complex(base[0], base[1]), complex(back[0], back[1])
 
     return toward
+
+
+def oriented_pair(points: PhotoPoints, photos: tuple[str, str], focal: float) -> tuple[Floats, Floats] | None:
+    """Orient two photos: the base, and the rotation (3, 3) of the second in the first; None where that is too weak."""
+    try:
+        with np.errstate(all="ignore"):
+            pairs = collect_pairs(points, photos, focal)
+            if len(pairs.pair) < LEAST_POINTS:
+                return None
+            oriented, converged = orient_unchecked(pairs)
+            doubtful = unusable_pairs(oriented, converged)
+    except (GeometryError, np.linalg.LinAlgError):
+        return None
+    if doubtful[0] or not oriented.sigma0[0] < PAIR_SIGMA0 * focal:
+        return None
+    base, turn = (each[0] for each in oriented.relative)
+    return base, turn
 
 
 ALL_PHOTOS, ONE_PHOTO = "P101", "P102"  # image coordinates in another unit

@@ -24,7 +24,7 @@ from photostrip.pipeline.control_readings import find_distance
 from photostrip.pipeline.evidence import of_images, of_units
 from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
-from photostrip.pipeline.frames import GroundFrames, PhotoCoordinates
+from photostrip.pipeline.frames import CAMERAS, GroundFrames, PhotoCoordinates
 from photostrip.pipeline.given_on_ground import GivenControl, Predicted
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
 from photostrip.pipeline.precision import compared_strips
@@ -52,15 +52,23 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     return _of_data(inputs, settings, directory, None, _given_control(inputs, directory), starts=False)
 
 
-def require_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates) -> None:
-    """Refuse images of which no camera can be the source: an adjustment would blame what is given for them.
+def require_sound(inputs: Inputs, settings: Settings, photo: PhotoCoordinates, directory: Path | None) -> None:
+    """Refuse images that no camera makes, and camera positions that are misread: an adjustment would blame others.
 
-    Raises InputError with the first finding of image coordinates in another unit, or of a lens that nobody makes.
+    Raises InputError with the first finding of image coordinates in another unit, of a lens that nobody makes, or of
+    camera positions in another unit, frame or order of axes.
     """
-    for each in of_units(inputs, settings, photo) if inputs.models is None else ():
+    if inputs.models is not None:
+        return
+    findings = [*of_units(inputs, settings, photo)]
+    if settings.together:
+        given = given_on_ground.over_control(inputs, photo.observations, directory)
+        findings += accepted([each.misread for each in given if each.misread is not None], settings.accept)
+    for each in findings:
         if each.is_error and not each.accepted:
             message = f"{each.message}; nothing is adjusted, unless `accept: [{each.code}]` says that it is right"
-            raise InputError(Fault(message, code="images-refused", key=each.key, fix=each.fix))
+            code = "positions-refused" if each.key.startswith(CAMERAS) else "images-refused"
+            raise InputError(Fault(message, code=code, key=each.key, fix=each.fix))
 
 
 def of_failure(
@@ -194,6 +202,8 @@ def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tu
     told = (each for each in findings if found.isdisjoint(each.strips) or each.code not in OF_STRIPS)
     told = (each for each in told if each.code not in silent)
     told = (each for each in told if each.code != BELOW or each.key or turned.isdisjoint(each.strips))
+    if not settings.together:  # what is given of cameras takes no part
+        told = (replace(each, severity="warning") if each.key.startswith(CAMERAS) else each for each in told)
     return accepted(told, settings.accept)
 
 
@@ -289,7 +299,7 @@ def _of_adjusted_flight(strip: StripResult) -> Iterator[Finding]:
     """Look at the perspective centres of a strip as a bundle has left them."""
     centers = strip.resection.centers
     depth = np.full(len(centers), np.median(centers[:, 2]) - np.median(strip.xyz[:, 2]))  # the Earth bends both alike
-    return flight.find_odd_centers(centers, depth, np.array([0.0, 0.0, 1.0]), strip.strip.photos, strip.strip.id)
+    return flight.find_odd_centers(centers, depth, given_on_ground.UP, strip.strip.photos, strip.strip.id)
 
 
 def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterable[FormedPhotos]) -> Iterator[Finding]:

@@ -160,7 +160,7 @@ def triangulate(
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        gate.require_images(inputs, settings, photo)
+        gate.require_sound(inputs, settings, photo, directory)
         result = _walk_of_any_order(inputs, settings, ground, photo)
     except (InputError, GeometryError) as error:
         error.findings = _of_failure(inputs, settings, directory, ground, photo, error)

@@ -135,8 +135,8 @@ def control_notes(strip: Strip | ModelStrip, orientation: AbsoluteOrientation) -
         yield Note("little-control", text, strip=strip.id)
     if orientation.condition > 1 / WEAK_LIMIT:
         text = (
-            f"strip {strip.id}: the control lies nearly on one line: the errors of one movement of the strip are "
-            f"{orientation.condition:.0f} times those of the other movements"
+            f"strip {strip.id}: the control lies nearly on one line: it holds one movement of the strip, as the turn "
+            f"about that line, {orientation.condition:.0f} times worse than the others; add control beside it"
         )
         yield Note("weak-control", text, strip=strip.id)
 

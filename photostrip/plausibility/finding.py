@@ -128,20 +128,22 @@ KINDS: dict[str, Kind] = {
         WARNING,
     ),
     "P401": Kind(
-        "control axes exchanged, or photos mirrored",
-        "the strip fits only so, or the area of the crs only with exchanged axes",
+        "axes exchanged, or photos mirrored",
+        "the strip fits only so, or the area of the crs, or camera positions, only with exchanged axes",
         ERROR,
     ),
     "P402": Kind(
-        "control outside its coordinate reference system",
-        "far outside, and another reading lies inside: a digit, a zone, a hemisphere",
+        "another coordinate reference system",
+        "far outside its area, or camera positions away from the control: a digit, a zone, a hemisphere",
         ERROR,
     ),
-    "P403": Kind("control in feet", "in feet it falls into the area, or two lists differ by 3.28", ERROR),
+    "P403": Kind(
+        "feet and metres", "in feet it falls into the area, or lists or camera positions differ by 3.28", ERROR
+    ),
     "P404": Kind("heights of two kinds", "two lists, or full and height points, differ by one height", ERROR),
     "P405": Kind(
         "plan and height in different units",
-        "3.28, 0.305, 100, 1000 or 0.001 times the heights of the strip",
+        "3.28, 0.305, 100, 1000 or 0.001 times the heights of the strip, or of the photos",
         ERROR,
     ),
     "P406": Kind("slip of a digit", "with a digit changed, added, left out or exchanged it fits", WARNING),

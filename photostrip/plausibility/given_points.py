@@ -519,18 +519,23 @@ class ShiftedList(NamedTuple):
 def find_shared(strip: StripAtControl) -> StretchedHeights | ShiftedList | None:
     """Find what all control of a strip, or of a list, shares; None where nothing says so, or single points say more."""
     # the section with most relief says most
-    _, strip = max(strip.sections, key=lambda each: float(np.std(each[1].placed[:, HEIGHT])))
-    count = len(strip.coordinates.point)
-    if count <= strip.design.shape[1] + 1:
-        return None
-    try:
-        laid = strip.laid
-        whole = adjust(laid, laid.misclosures(), strip.joint_covariance, bends=False)
-    except PhotostripError:
+    strip, whole = _adjusted(max(strip.sections, key=lambda each: float(np.std(each[1].placed[:, HEIGHT])))[1])
+    if whole is None:
         return None
     alone = max((each.gain for each in whole.deletions(whole.points) if np.isfinite(each.gain)), default=0.0)
     found = [_stretch(strip, whole, alone), *_shifts(strip, whole, alone)]
     return max((each for each in found if each is not None), key=lambda each: each.gain, default=None)
+
+
+def _adjusted(strip: StripAtControl) -> tuple[StripAtControl, JointAdjustment | None]:
+    """Return a section with the adjustment of its misclosures; None where nothing checks what is common to them."""
+    if len(strip.coordinates.point) <= strip.design.shape[1] + 1:
+        return strip, None
+    try:
+        laid = strip.laid
+        return strip, adjust(laid, laid.misclosures(), strip.joint_covariance, bends=False)
+    except PhotostripError:
+        return strip, None
 
 
 def _stretch(strip: StripAtControl, whole: JointAdjustment, alone: float) -> StretchedHeights | None:
@@ -552,13 +557,8 @@ def find_curvature(strip: StripAtControl) -> Shared | None:
     A strip lies D^2 / 2R lower than heights of a map, at the distance D from its middle. Its own bends stand in the
     covariance of the misclosures: those of a sound strip are not taken for it. Source: [001] eq. 153.
     """
-    _, strip = max(strip.sections, key=lambda each: float(np.ptp(each[1].placed[:, 0])))
-    if len(strip.coordinates.point) <= strip.design.shape[1] + 1:
-        return None
-    try:
-        laid = strip.laid
-        whole = adjust(laid, laid.misclosures(), strip.joint_covariance, bends=False)
-    except PhotostripError:
+    strip, whole = _adjusted(max(strip.sections, key=lambda each: float(np.ptp(each[1].placed[:, 0])))[1])
+    if whole is None:
         return None
     place, d = strip.coordinates, strip.placed[:, :HEIGHT] - strip.placed[:, :HEIGHT].mean(axis=0)
     fall = (d**2).sum(axis=1)[place.point] / (2.0 * EARTH_RADIUS)

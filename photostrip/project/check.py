@@ -25,6 +25,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted, listed
 from photostrip.pipeline import gate
 from photostrip.pipeline.frames import orient_interior
+from photostrip.pipeline.given_on_ground import over_control
 from photostrip.pipeline.inputs import (
     BUNDLE,
     Inputs,
@@ -106,6 +107,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         **sigma,
         "frames": frames,
         "control": list(_control(project, tables)),
+        "cameras": list(_cameras(project)),
         "rows": table_rows(project, tables, gaps),
     }
     kept = Findings()  # of too many faults in one file they only count the rest
@@ -267,6 +269,22 @@ def _frames(project: Project, tables: Tables, faults: list[Fault]) -> list[Docum
     if all(frame is not output for frame in frames):
         found.append({"file": "", "frame": output.describe(), "kind": output.kind, "is_output": True})
     return found
+
+
+def _cameras(project: Project) -> Iterator[Document]:
+    """Say of given positions of cameras in which frame they are, how precise, and where they lie beside the control."""
+    inputs = project.inputs
+    for at in over_control(inputs, inputs.observations, project.directory) if inputs.models is None else ():
+        step = None if at.plan is None or not len(at.control) else at.plan.step
+        yield {
+            "key": at.given.key,
+            "photos": len(at.given.photos),
+            "frame": at.given.frame.name,
+            "smallest_sigma_m": np.nanmin(at.given.sigma, axis=0).tolist(),
+            "largest_sigma_m": np.nanmax(at.given.sigma, axis=0).tolist(),
+            "above_control_m": None if step is None else float(step[2]),
+            "beside_control_m": None if step is None else float(np.linalg.norm(step[:2])),
+        }
 
 
 def _decoded(project: Project, frame: GroundFrame, rows: Numbers) -> Document:

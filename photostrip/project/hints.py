@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from photostrip.formats.faults import meant
-from photostrip.formats.measured import ControlTable, Measurements, OrientationTable, PositionTable
+from photostrip.formats.faults import number as read_number
+from photostrip.formats.measured import ControlTable, GivenTable, Measurements, OrientationTable, PositionTable
 from photostrip.formats.tables import Table
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import AUTO, BUNDLE
@@ -89,6 +90,7 @@ def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     yield from _unused_cameras(project, root)
     yield from _linear_distortion(project, root)
     yield from _without_effect(project, root)
+    yield from _sigmas_of_rows(tables, root)
     for name, camera in project.cameras.items():
         if isinstance(camera, Camera) and (solved := certificate_of(camera)) is not None:
             yield _solved_marks(name, camera, solved, root)
@@ -207,6 +209,28 @@ def _without_effect(project: ProjectFile, root: Node) -> Iterator[Note]:
                     told.add(key)
                     message = f"`{key}` has no effect here: it counts with {condition.by}"
                     yield root.place_of(path).note("without-effect", message, key=key)
+
+
+def _sigmas_of_rows(tables: Tables, root: Node) -> Iterator[Note]:
+    """Name the `sigma` of a section, where every row of its table has another one of its own, which counts."""
+    sections: list[tuple[tuple[str | int, ...], Measurements | GivenTable | None]] = [
+        (("observations",), tables.observations if tables.fiducials is None else None),
+        (("camera_positions",), tables.positions),
+        *((("control", number), read) for number, read in enumerate(tables.control)),
+    ]
+    for path, read in sections:
+        node = root.find(*path, "sigma")
+        if read is None or node is None or node.place.file not in {root.place.file, *NO_FILES}:
+            continue
+        stated = np.array([read_number(each.text) for each in node.elements or [node]], float)
+        use = read.use if isinstance(read, GivenTable) else np.ones(read.sigma.shape, bool)
+        own = read.sigma[use]
+        if len(own) and np.isfinite(own).all() and (own != np.broadcast_to(stated, use.shape)[use]).any():
+            key, columns = key_path((*path, "sigma")), "sx, sy, sz" if use.shape[1] > len("xy") else "sx, sy"
+            message = (
+                f"`{key}` has no effect here: every row of {read.table.file} has its own ({columns}), which counts"
+            )
+            yield root.place_of((*path, "sigma")).note("without-effect", message, key=key)
 
 
 def _ends(root: Node, path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

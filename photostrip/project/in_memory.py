@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", "Fault", "Finding", "Note")
 FILE = "file"  # key of the table of a block
-NAMING = {"photo", "point"}  # columns of which every table has one, and no block a key
+NAMING = "photo", "point"  # columns of which every table has one; as keys of a block they hold one name
 MANY = "as many tables, in a list, each with columns by name"
 TABLE = "a data frame, a structured array, or a mapping of names of columns to values"
 PROJECT, SPECIFICATION = "project", "specification"  # what mappings are called in messages
@@ -63,7 +63,8 @@ def with_tables(content: Mapping[str, Any], overrides: Mapping[str, Any]) -> tup
 
 def _is_frame(value: object) -> bool:
     """Whether a value can be a table only: a data frame of any library, an array, or columns by name."""
-    by_name = isinstance(value, Mapping) and not NAMING.isdisjoint(value)
+    columns = [value.get(each, "") for each in NAMING] if isinstance(value, Mapping) else []
+    by_name = any(hasattr(each, "__len__") and not isinstance(each, str) for each in columns)
     return hasattr(value, "columns") or isinstance(value, np.ndarray) or by_name
 
 

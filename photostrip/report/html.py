@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from hashlib import sha256
 from importlib import resources
 from itertools import groupby
+from operator import itemgetter
 
 from photostrip.notes import Document
 from photostrip.report.commands.batch import batch_sections
@@ -27,6 +28,11 @@ FOREMOST = "verdict", "findings", "check"  # sections before the pictures
 Name = tuple[str, str]  # what it is, and its id
 
 MOST_LINKS = 2  # rows, and pictures, to which one finding leads: one line of them
+OF_GROUND = {
+    "plan": "",
+    "footprints": "photo",
+    "ties": "photo",
+}  # what pictures of the ground show of findings; "": all
 KINDS = {"point": "point", "photo": "photo", "photos": "photo"}  # heads of first columns
 
 
@@ -155,16 +161,17 @@ def link(sections: list[Document]) -> None:
                     row["findings"].append(item["number"])
                     _lead(item["links"], row["id"], f"{row['cells'][0]} in {section['title']}")
                 led += [] if item in led else [item]
-        whole = [item for items in findings.values() for item in items] if section["id"] == "pictures" else led
         for picture in section["pictures"]:
-            for item in whole:
+            kind = OF_GROUND.get(picture["name"])
+            named = [item for name, items in findings.items() if kind in {"", name[0]} for item in items]
+            for item in sorted(led if kind is None else named, key=itemgetter("number")):
                 if item["number"] not in picture["findings"]:
                     picture["findings"].append(item["number"])
                     _lead(item["pictures"], f"picture-{picture['name']}", picture["title"])
 
 
 def _lead(links: list[Document], to: str, words: str) -> None:
-    if len(links) < MOST_LINKS:
+    if len(links) < MOST_LINKS and words not in map(itemgetter("words"), links):
         links.append({"id": to, "words": words})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from photostrip.network.problem import CALIBRATION, BundleProblem, BundleSetting
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
+from photostrip.result.given import COUNTED, PLACES
 from photostrip.result.numbers import PER_RADIAN, attributes, record, rms
 from photostrip.result.points import ImageResiduals
 from photostrip.result.table import Table
@@ -61,7 +62,7 @@ def bundle_of(result: Result) -> Document:
         return {}
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
-    shift = screened.limit.shifts(settings.power)
+    shift, groups = screened.limit.shifts(settings.power), _tested(found)
     written = kinds(result.settings.angle_unit, of_models=problem.of_models)
     block: Document = {
         "free_network": solution.free,
@@ -87,13 +88,14 @@ def bundle_of(result: Result) -> Document:
         "reliability": {
             "power": settings.power,
             "noncentrality": shift[reliability.IMAGE],
+            "noncentrality_given": shift[reliability.CONTROL],
             **_image_sigma(found),
             "groups": Table.of_rows(
                 "bundle.reliability.groups",
-                (_group(group, shift[group.kind], written[group.kind]) for group in found.groups),
+                (_group(group, shift[group.kind], written[group.kind]) for group in groups),
             ),
-            "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in found.groups]),
-            "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in found.groups]),
+            "weakest": _foremost("weakest", found, shift, written, [-group.redundancy for group in groups]),
+            "worst": _foremost("worst", found, shift, written, [np.abs(group.standardised) for group in groups]),
         },
         "variance_components": Table.of_rows(
             "bundle.variance_components",
@@ -104,11 +106,15 @@ def bundle_of(result: Result) -> Document:
         ),
         "calibration": Table.of_rows("bundle.calibration", _calibration(result, found)),
         "correlations": Table.of_rows("bundle.correlations", map(asdict, found.correlations)),
-        "positions": Table.of_rows("bundle.positions", _positions(found)),
         "corrections": Table.of_rows("bundle.corrections", _corrections(found)),
         "taken_up": Table.of_rows("bundle.taken_up", _taken_up(found)),
     }
     return {"bundle": record("bundle", block)}
+
+
+def _tested(found: Bundle) -> list[reliability.Group]:
+    """Return the observations with the standard deviations by which the search for gross errors tests them."""
+    return [replace(each, sigma=each.sigma * found.screened.limit.unit) for each in found.groups]
 
 
 def _sigma0(found: Bundle) -> Document:
@@ -125,6 +131,9 @@ def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, Gr
         "test": settings.test,
         "alpha": screened.limit.alpha,
         "limit": screened.limit.value,
+        "alpha_given": screened.limit.alpha_of_given,
+        "limit_given": screened.limit.given,
+        "unit": screened.limit.unit,
         "rejected": {written[kind].name: sum(each.kind == kind for each in out) for kind in OBSERVED},
         "readmitted": len(screened.rejections) - len(out),
     }
@@ -181,18 +190,30 @@ def _at_corner(camera: Camera, measured: Floats) -> Floats:
     return np.asarray(np.hypot(*moved.transpose(1, 0, 2)).max(axis=1), float)
 
 
-def _positions(found: Bundle) -> Iterator[Document]:
-    """Return the differences at camera positions, adjusted minus given."""
-    problem, given = found.screened.problem, found.screened.problem.positions
-    sigma = np.where(np.isfinite(given.sigma), given.sigma, np.nan)
-    moved = np.where(np.isfinite(given.sigma), found.screened.solution.position_residuals, np.nan)
-    (redundancy,) = (
-        (each.redundancy for each in found.groups if each.kind == reliability.POSITION) if len(sigma) else ((),)
-    )
-    for row, photo in enumerate(given.photo.tolist()):
-        values = (("d", moved[row]), ("sigma", sigma[row]), ("redundancy", redundancy[row]))
-        of_axes = {f"{key}_{axis}": size for key, of in values for axis, size in zip(GROUND_AXES, of, strict=True)}
-        yield {"photo": problem.photo_name(photo), **of_axes}
+def positions_of(result: Result) -> Document:
+    """Return the table ``positions`` under its key: camera positions, adjusted minus given; nothing without any."""
+    if result.bundle is None or not len(result.bundle.block.problem.positions):
+        return {}
+    found, stated = result.bundle.screened, result.bundle.block.problem.positions.sigma
+    given, used = np.isfinite(stated), np.isfinite(found.problem.positions.sigma)
+    cofactor = np.diagonal(found.precision.position_residuals, axis1=1, axis2=2)
+    share = np.where(used, cofactor, stated**2 - cofactor) / stated**2  # of one that was left out: minus the adjusted
+    with np.errstate(invalid="ignore", divide="ignore"):
+        over = found.solution.position_residuals / (stated * np.sqrt(share) * found.limit.unit)
+    values = {
+        "d": np.where(given, found.solution.position_residuals, np.nan),
+        "normalised": np.where(given & (share >= UNCONTROLLED), over, np.nan),
+        "sigma": np.where(given, stated, np.nan),
+        "redundancy": np.where(used, share, np.nan),
+    }
+    words = np.array(("", *COUNTED), object)
+    columns = {
+        "photo": [found.problem.photo_name(photo) for photo in found.problem.positions.photo.tolist()],
+        "use": words[given @ PLACES],
+        "rejected": words[(given & ~used) @ PLACES],
+        **{f"{key}_{axis}": size[:, k] for key, size in values.items() for k, axis in enumerate(GROUND_AXES)},
+    }
+    return {"positions": Table.of("positions", columns)}
 
 
 def _corrections(found: Bundle) -> Iterator[Document]:
@@ -280,12 +301,13 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     if found is None or result.model_strips:
         return residuals
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
-    columns = {"redundancy": group.redundancy} | ({} if _image_sigma(found) else {"sigma": group.sigma * MICROMETRES})
+    columns = {"redundancy": group.redundancy, "test": group.standardised / found.screened.limit.unit}
+    columns |= {} if _image_sigma(found) else {"sigma": group.sigma * MICROMETRES}
     at = np.full(len(result.refined.observations), len(group.sigma))  # the last row: a ray that took no part
     at[found.block.rows[found.screened.selection.images]] = np.arange(len(group.sigma))
     at = at[np.concatenate([image.rows for image in images])]
     values = {key: np.vstack([column, np.full(2, np.nan)])[at] for key, column in columns.items()}
-    units = {"redundancy": "", "sigma": "_um"}
+    units = {"redundancy": "", "test": "", "sigma": "_um"}
     return residuals.with_columns(
         **{f"{key}_{axis}{units[key]}": of_key[:, k] for key, of_key in values.items() for k, axis in enumerate("xy")}
     )
@@ -303,14 +325,15 @@ def _foremost(
 ) -> Table:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
-    for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
+    groups = _tested(found)
+    for number, (group, value) in enumerate(zip(groups, values, strict=True)):
         known = np.isfinite(group.sigma) & np.isfinite(value)
         flat = np.where(known, value, -np.inf).ravel()
         best = np.argsort(-flat, kind="stable")[:SHOWN]
         chosen += [(-float(flat[at]), number, int(at)) for at in best.tolist() if np.isfinite(flat[at])]
     rows = []
     for _, number, at in sorted(chosen)[:SHOWN]:
-        group = found.groups[number]
+        group = groups[number]
         place = np.array([divmod(at, group.sigma.shape[1])])
         columns = _observed(found, group, place, shift[group.kind], written[group.kind])
         rows.append({key: column[0] for key, column in columns.items()})

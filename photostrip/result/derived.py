@@ -18,20 +18,20 @@ def with_derived(document: Document) -> Document:
     derived = {"points": _with_ellipses(document["points"], document["frame"])}
     if "residuals" in document and {"redundancy_x", "redundancy_y"} <= {*document["residuals"].columns}:
         bundle: Document = document.get("bundle") or {}  # somebody may have edited it
-        derived["residuals"] = _with_tests(document["residuals"], bundle.get("reliability", {}))
+        derived["residuals"] = _with_detectable(document["residuals"], bundle)
     return document | derived
 
 
-def _with_tests(rays: Table, reliability: Document) -> Table:
-    """Add standardised residuals v / (sigma sqrt(r)) and detectable errors: sigma / sqrt(r) times the noncentrality."""
-    columns, noncentrality = {}, _number(reliability.get("noncentrality"))
+def _with_detectable(rays: Table, bundle: Document) -> Table:
+    """Add detectable errors: sigma / sqrt(r) times the noncentrality; sigma by which the search tests."""
+    reliability, columns = bundle.get("reliability", {}), {}
+    shift = _number(reliability.get("noncentrality")) * _number(bundle.get("screening", {}).get("unit"))
     for axis in "xy":
         of_axis = f"sigma_{axis}_um"
         sigma = rays[of_axis] if of_axis in rays.columns else _number(reliability.get("image_sigma_um"))
         redundancy = rays[f"redundancy_{axis}"].astype(float)
         shown = np.sqrt(np.where(redundancy >= UNCONTROLLED, redundancy, np.nan))
-        columns[f"test_{axis}"] = rays[f"v{axis}_um"] / (sigma * shown)
-        columns[f"detectable_{axis}_um"] = noncentrality * sigma / shown
+        columns[f"detectable_{axis}_um"] = shift * sigma / shown
     return rays.with_columns(**columns)
 
 

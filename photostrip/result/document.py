@@ -55,6 +55,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **bundle.bundle_of(result),
         **strips.classical_of(result),
         "control": given.control_of(result, found),
+        **bundle.positions_of(result),
         "misclosures": given.misclosures_of(result),
         "ties": points.ties_of(result, rank),
         "rejected": taken_out,

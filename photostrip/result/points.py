@@ -227,34 +227,40 @@ def image_residuals(result: Result, rank: Numbers) -> list[ImageResiduals]:
     observations, found = result.refined.observations, []
     for strip in result.photo_strips:
         photos = strip.of_photos.strip.oriented(strip.resection.centers, strip.resection.rotations)
-        known = _known(observations, strip.formed.point, strip.xyz, strip.rows)
+        known = _known(observations, strip.formed.point, strip.xyz, strip.rows, strip.resection.residuals)
         found.append(_residuals(observations, strip.of_photos.strip, photos, known, rank))
     if result.bundle is None or not result.bundle.singles:
         return found
-    rows = result.bundle.block.rows[result.bundle.screened.selection.images]
-    known = _known(observations, result.points.number, result.points.cartesian, rows)
-    for each in result.bundle.singles:
+    bundle = result.bundle
+    rows, own = bundle.block.rows[bundle.screened.selection.images], bundle.screened.solution.image_residuals
+    known = _known(observations, result.points.number, result.points.cartesian, rows, own)
+    for each in bundle.singles:
         photos = each.strip.oriented(each.center[None], each.rotation[None])
         found.append(_residuals(observations, each.strip, photos, known, rank))
     return found
 
 
-def _known(observations: PhotoPoints, number: Numbers, xyz: Floats, rows: Numbers) -> tuple[Floats, Flags]:
-    """Return the places of all points, and which measurements took part: those in some rows."""
+def _known(
+    observations: PhotoPoints, number: Numbers, xyz: Floats, rows: Numbers, own: Floats
+) -> tuple[Floats, Flags, Floats]:
+    """Return the places of all points, which measurements took part, and the residuals of these: those in some rows."""
     places, used = np.full((len(observations.point_ids), 3), np.nan), np.zeros(len(observations), bool)
-    places[number], used[rows] = xyz, True
-    return places, used
+    residuals = np.full((len(observations), 2), np.nan)
+    places[number], used[rows], residuals[rows] = xyz, True, own
+    return places, used, residuals
 
 
 def _residuals(
-    observations: PhotoPoints, strip: Strip, photos: KnownPhotos, known: tuple[Floats, Flags], rank: Numbers
+    observations: PhotoPoints, strip: Strip, photos: KnownPhotos, known: tuple[Floats, Flags, Floats], rank: Numbers
 ) -> ImageResiduals:
-    position, (places, used) = strip.positions(observations), known
+    """Return residuals: of what took part those of the adjustment, of all else how its points would be seen."""
+    position, (places, used, own) = strip.positions(observations), known
     rows = np.flatnonzero(position >= 0)
     rows = rows[order_of(position[rows], rank[observations.point[rows]])]
     photo, point = position[rows], observations.point[rows]
     with np.errstate(invalid="ignore"):
-        residuals = observations.xy[rows] - project(places[point], photos, photo)
+        seen = observations.xy[rows] - project(places[point], photos, photo)
+        residuals = np.where(used[rows, None], own[rows], seen)
         depth = depths(places, point, photos.centers, photos.rotations, photo)
     return ImageResiduals(strip=strip, rows=rows, photo=photo, residuals=residuals, depth=depth, used=used[rows])
 

@@ -147,17 +147,8 @@ def runs(ends: Numbers, most: int) -> list[tuple[int, int]]:
     return list(pairwise(np.unique(first).tolist()))
 
 
-def of_known_photos(
-    xy: Floats, points: Floats, photo: Numbers, photos: KnownPhotos, image: Numbers, point: Numbers
-) -> Resection:
-    """Image residuals of photos whose orientation is known already, as a resection.
-
-    xy, points: (k, 2), (q, 3), image coordinates in mm, and points.
-    photo, image, point: (m,), the photo of each residual, and its rows in these.
-    """
-    residuals = np.empty((len(photo), 2))
-    for rows in pieces(len(photo)):  # to gather all of them takes as much again
-        residuals[rows] = xy[image[rows]] - project(points[point[rows]], photos, photo[rows])
+def of_known_photos(residuals: Floats, photo: Numbers, photos: KnownPhotos) -> Resection:
+    """Photos whose orientation is known already, as a resection: residuals (m, 2) in mm, and the photo of each (m,)."""
     return _with_residuals(residuals, photo, photos, np.ones(len(photos.centers), bool))
 
 

@@ -227,11 +227,7 @@ def test_make_adjusts_what_changed_and_nothing_else(tmp_path: Path, forked: Path
     folder = Folder(tmp_path, forked)
     assert folder.renewed("-j2") == {"a", "b"}
     assert folder.renewed("-j2") == set()
-    for touched, expected in (
-        ("a/control.csv", {"a"}),
-        ("b/own.gtx", {"b"}),
-        ("deeper.yaml", {"a", "b"}),
-    ):
+    for touched, expected in (("a/control.csv", {"a"}), ("b/own.gtx", {"b"}), ("deeper.yaml", {"a", "b"})):
         folder.touch(touched)
         assert folder.renewed("-j2") == expected, touched
     assert folder.renewed("RUN_FLAGS=--set processing.polynomial.degree=1") == {"a", "b"}

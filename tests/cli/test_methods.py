@@ -164,7 +164,7 @@ def test_a_block_with_positions_from_end_to_end(answer: Answer, run: Run, tmp_pa
     answer("run", project, *BUNDLE, "-o", tmp_path / "out", "--trace", tmp_path / "trace.txt")
     document = read_result(str(tmp_path / "out" / "result.json"))
     assert document["bundle"]["observations"]["position"] == 3 * 12
-    assert len(document["bundle"]["positions"]) == 12
+    assert len(document["positions"]) == 12
     assert all(photo["sigma_z"] > 0 for photo in nonempty(document["photos"]))
     assert (tmp_path / "trace.txt").read_text(encoding="utf-8").startswith("Trace: small\n")
     again = project.with_name("again.yaml")

@@ -122,11 +122,7 @@ def test_convergence_is_that_of_proj(crs: str, u: float, v: float) -> None:
     assert math.remainder(turn, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-7)
 
 
-@given(
-    lon=st.floats(-180.0, 180.0),
-    lat=st.floats(-89.0, 89.0),
-    shift=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
-)
+@given(lon=st.floats(-180.0, 180.0), lat=st.floats(-89.0, 89.0), shift=st.tuples(*[st.floats(-50.0, 50.0)] * 3))
 def test_differences_of_longitudes_and_latitudes_are_metres(lon: float, lat: float, shift: tuple[float, ...]) -> None:
     grid = frame("EPSG:4979")
     here = grid.cartesian_from_ground([[lon, lat, 300.0]])

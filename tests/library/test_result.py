@@ -119,7 +119,7 @@ def test_columns_without_values_keep_their_kind() -> None:
 def test_a_table_shows_itself(result: photostrip.Result) -> None:
     assert repr(result.residuals) == (
         "<residuals: 469 rows; photo, point, vx_um [um], vy_um [um], used, q_um [um], zone, redundancy_x, "
-        "redundancy_y, test_x, detectable_x_um [um], test_y, detectable_y_um [um]>"
+        "redundancy_y, test_x, test_y, detectable_x_um [um], detectable_y_um [um]>"
     )
     page = result.residuals._repr_html_()
     assert page.count("<tr>") == 11

@@ -92,7 +92,7 @@ def test_a_photo_with_too_few_points_is_named() -> None:
     ("breadth", "off", "words"),
     [
         (0.0, 0.0, r"did not converge in 1 step$"),
-        (0.02, 0.0, r"hardly determines roll about the flight line: the points move by .*, and a given coordinate has"),
+        (0.02, 0.0, r"hardly determines roll about the flight line of the whole: .*, where a given coordinate has"),
         (0.0, 5.0, r"control point .* m off, .* times its standard deviation; are its coordinates or its id wrong"),
     ],
 )

@@ -13,8 +13,9 @@ import pytest
 
 from photostrip.camera import Camera
 from photostrip.comparison import compare_results
-from photostrip.errors import GeometryError
+from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.rotation import from_vector
+from photostrip.pipeline import gate
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.report.html import to_html
 from photostrip.report.sections.accuracy_report import sections_of
@@ -27,6 +28,7 @@ from tests.pipeline.blocks import (
     corners,
     errors,
     exact,
+    lost,
     measured,
     note,
     orientations,
@@ -36,7 +38,7 @@ from tests.pipeline.blocks import (
     with_control,
 )
 from tests.results import result_files
-from tests.simulated import inputs_of
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -113,6 +115,45 @@ def test_sixteen_photos_come_out_as_their_strips_do(given: Callable[[Simulation]
     assert rms(simulation, result) < 0.05
     assert result.findings == ()
     assert document_of(result)["counts"]["strips"] == 4
+
+
+MISREAD = {  # what stands in place of positions, by the finding: feet, exchanged axes; without a change another zone
+    "P405": lambda enu: enu / [1.0, 1.0, 0.3048],
+    "P403": lambda enu: enu / 0.3048,
+    "P401": lambda enu: enu[:, [1, 0, 2]],
+    "P402": lambda enu: enu,
+}
+
+
+@pytest.mark.parametrize("order", [lambda inputs: inputs, in_no_order])
+@pytest.mark.parametrize("code", MISREAD)
+def test_positions_that_are_misread_are_named_and_no_control_is_blamed(
+    code: str, order: Callable[[Inputs], Inputs]
+) -> None:
+    simulation = simulate(UAV)
+    given = order(three_corners(simulation))
+    assert given.positions is not None
+    frame = replace(given.positions.frame, crs="EPSG:32632") if code == "P402" else given.positions.frame
+    read = replace(given.positions, frame=frame, enu=MISREAD[code](given.positions.enu))
+    with pytest.raises(InputError, match="nothing is adjusted") as refused:
+        adjusted(simulation, replace(given, positions=read))
+    checked = gate.of_inputs(replace(given, positions=read), settings_of(simulation))
+    assert [each.code for each in checked] == [each.code for each in refused.value.findings] == [code]
+    assert checked[0].key.startswith("camera_positions.")
+
+
+def test_an_exchange_of_two_positions_is_named_and_costs_neither() -> None:
+    """Both were rejected, once by themselves, once beside the offset of an antenna."""
+    simulation = simulate(UAV)
+    given = in_no_order(three_corners(simulation))
+    assert given.positions is not None
+    for antenna in (0.0, 1.2):
+        enu = given.positions.enu[[0, 3, 2, 1, *range(4, 16)]] + [0.0, 0.0, antenna]
+        result = adjusted(simulation, replace(given, positions=replace(given.positions, enu=enu)))
+        assert [next(iter(each.evidence)) for each in result.findings] == ["order", "offset_east_m"][
+            : 1 + bool(antenna)
+        ]
+        assert lost(result, "control", "position") == []
 
 
 def test_oblique_photos_start_from_their_orientations() -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
+from benchmarks import planted
 from photostrip.camera import Camera, Distortion
 from photostrip.network.hypotheses import log_probability, log_probability_of_any
-from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import FILM, Control, Flight, Gnss, GrossError, Image, Points, Spec, Terrain, simulate
@@ -37,19 +37,10 @@ def adjusted(
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
     flight = Flight(photos=10, strips=strips)
     simulation = simulate(Spec(seed=7, flight=flight, control=Control(bands=2), gnss=Gnss()))
-    inputs, photos = inputs_of(simulation), simulation.truth.photo_ids
-    assert simulation.gnss is not None
-    inputs = replace(
-        inputs,
-        positions=CameraPositions(
-            photos=photos,
-            frame=inputs.frames[0],
-            enu=simulation.gnss[rows] + np.asarray(shift, float),
-            use=np.ones((len(photos), 3), bool),
-            sigma=np.tile((0.10, 0.10, 0.15), (len(photos), 1)),
-            time=np.full(len(photos), np.nan),
-        ),
-    )
+    inputs = planted.with_gnss(np.random.default_rng(), simulation)
+    assert inputs.positions is not None
+    read = replace(inputs.positions, enu=inputs.positions.enu[rows] + np.asarray(shift, float))
+    inputs = replace(inputs, positions=read)
     return simulation, triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
 
 
@@ -68,9 +59,7 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
     assert rms(simulation, result) < 0.4
 
 
-@pytest.mark.slow
 def test_a_drift_of_the_positions_is_named() -> None:
-    """Half a metre from photo to photo."""
     _, result = adjusted(strips=1, shift=np.arange(10)[:, None] * np.array([0.5, 0.0, 0.2]))
     (finding,) = result.findings
     assert "`correction: drift`" in finding.message
@@ -110,7 +99,7 @@ def test_positions_of_other_photos_are_named_and_put_right(rows: slice | np.ndar
     assert finding.evidence["order"] == order
     moved = np.flatnonzero(np.arange(10)[rows] != np.arange(10)) if order == "exchanged" else np.arange(10)
     assert finding.photos == tuple(simulation.truth.photo_ids[row] for row in moved)
-    assert lost(result, "control") == []
+    assert lost(result, "control", "position") == []
     assert rms(simulation, result) < 1.2 * rms(*adjusted(strips=1))
 
 

@@ -32,14 +32,7 @@ from photostrip.planning.ideal_strip import (
     numbers_of,
     spots_of,
 )
-from photostrip.planning.strip_design import (
-    Demand,
-    Placement,
-    bands_needed,
-    best_places,
-    outcome,
-    worst,
-)
+from photostrip.planning.strip_design import Demand, Placement, bands_needed, best_places, outcome, worst
 from photostrip.points import ControlPoints
 from photostrip.simulation import FILM, Points
 from photostrip.strip import polynomial

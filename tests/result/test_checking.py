@@ -12,8 +12,10 @@ import pytest
 
 import photostrip
 from photostrip.pipeline.inputs import Settings
+from photostrip.report.page.parts import Table
 from photostrip.report.pictures.result import pictures_of
 from photostrip.report.pictures.svg import Picture
+from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.bundle import bundle_of
 from photostrip.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Points, Spec
@@ -44,18 +46,14 @@ def test_two_rays_check_a_new_point_only_across_the_base(adjustment: str) -> Non
     found = Counter((row["rays"] > 2 or row["role"] == "control", row["checked"]) for row in document["points"])
     assert set(found) == {(False, "across"), (True, "along")}
     assert document["counts"]["points_checked"] == {
-        "along": found[True, "along"],
-        "across": found[False, "across"],
-        "none": 0,
-    }
+        "along": found[True, "along"], "across": found[False, "across"], "none": 0,
+    }  # fmt: skip
 
 
 def test_what_nothing_checks_may_hold_what_was_found_elsewhere() -> None:
     notes = {note["code"]: note["message"] for note in strip("bundle", wrong=0.06)["notes"]}
-    assert (
-        "points are checked only across the base, 0 not at all: about as many of their rays may be"
-        in (notes["unchecked-points"])
-    )
+    told = "points are checked only across the base, 0 not at all: about as many of their rays may be"
+    assert told in notes["unchecked-points"]
     assert "unchecked-points" not in {note["code"] for note in strip("bundle")["notes"]}
 
 
@@ -129,8 +127,15 @@ def test_redundancy_numbers_of_control_and_positions_sum_up_to_those_of_their_gr
     groups = {each["group"]: each["redundancy"] for each in document["bundle"]["reliability"]["groups"]}
     columns = [document["control"][f"redundancy_{k}"].astype(float) for k in (1, 2, 3)]
     assert np.nansum(columns) == pytest.approx(groups["control"], abs=0.02)
-    positions = [document["bundle"]["positions"][f"redundancy_{axis}"] for axis in ("east", "north", "up")]
-    assert np.sum(positions) == pytest.approx(groups["position"], abs=0.02)
+    positions = document["positions"]
+    left, over, sigma, share = (
+        np.array([positions[f"{key}_{axis}"] for axis in ("east", "north", "up")])
+        for key in ("d", "normalised", "sigma", "redundancy")
+    )
+    assert share.sum() == pytest.approx(groups["position"], abs=0.02)
+    assert over == pytest.approx(left / (sigma * np.sqrt(share)), abs=0.03)
+    (table,) = (part for part in chosen_sections(document, names=["positions"])[0].parts if isinstance(part, Table))
+    assert [row[2:5] for row in table.rows] == [tuple(f"{size:+z.3f}" for size in row) for row in left.T]
     # the error that is just found: noncentrality sigma / sqrt(r) (Baarda)
     rays, reliability = document["residuals"], document["bundle"]["reliability"]
     share, size = (rays[key].astype(float) for key in ("redundancy_x", "detectable_x_um"))

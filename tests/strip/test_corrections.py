@@ -15,13 +15,7 @@ from photostrip.camera import Camera, Distortion
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip import corrections
-from photostrip.strip.corrections import (
-    Bending,
-    ImageCorrectionSettings,
-    Refined,
-    curvature_constant,
-    image_from_ideal,
-)
+from photostrip.strip.corrections import Bending, ImageCorrectionSettings, Refined, curvature_constant, image_from_ideal
 from photostrip.strip.pixel_cameras import CONVENTIONS, PixelCamera, in_millimetres
 from tests.strips import measured
 

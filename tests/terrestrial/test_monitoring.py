@@ -11,14 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.terrestrial.camera_motion import (
-    ImagePair,
-    OneStation,
-    fit,
-    one_station,
-    turn_gradient,
-    turned,
-)
+from photostrip.terrestrial.camera_motion import ImagePair, OneStation, fit, one_station, turn_gradient, turned
 from photostrip.terrestrial.monitoring import Monitoring, MonitoringSettings, Series, monitor
 from photostrip.terrestrial.normal_case import ground_from_photo
 from tests.draws import orthogonal_normal

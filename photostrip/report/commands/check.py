@@ -19,6 +19,7 @@ def check_sections(document: Document, *, everything: bool = False) -> tuple[Sec
         _contents(document),
         _frames(document["frames"], UNITS[document["angle_unit"]], everything=everything),
         _sigmas(document["control"], everything=everything),
+        *map(_cameras, document["cameras"]),
         _rows(document["rows"], everything=everything),
     )
 
@@ -125,6 +126,19 @@ def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
         name = first["id"] + ("" if alone else ", …")
         rows.append((name, len(kind), _role(first), *first["sigma"], photos, _sources(first, line=alone)))
     return Section("Standard deviations of the control", (tabulated(columns, rows, note),))
+
+
+def _cameras(given: Document) -> Section:
+    """Say where given positions of cameras lie: far from the control they are in another frame, or unit."""
+    pairs = zip(given["smallest_sigma_m"], given["largest_sigma_m"], strict=True)
+    sigma = ", ".join(short(low) if low == high else f"{short(low)} to {short(high)}" for low, high in pairs)
+    rows = [("photos", str(given["photos"])), ("frame", given["frame"]), ("σ east, north, up", f"{sigma} m")]
+    if given["above_control_m"] is not None:
+        where = (
+            f"{given['above_control_m']:.4g} m above the control, {given['beside_control_m']:.0f} m beside its middle"
+        )
+        rows.append(("their middle", where))
+    return Section(given["key"].replace("_", " ").capitalize(), (Facts(tuple(rows)),))
 
 
 def _kinds(control: Sequence[Document]) -> tuple[list[list[Document]], str]:

@@ -32,6 +32,7 @@ MOST_STRIPS = 8  # that have panels
 AXES = ("along", "x"), ("across", "y"), ("up", "z")  # of a strip, and of its polynomials
 LEAST_KM = 2.0
 CURVE_STEPS = 48
+CUT = 10.0  # medians, at which differences stand at the ends of their axis
 
 
 def worst_strips(sizes: Mapping[str, float]) -> list[str]:
@@ -68,6 +69,10 @@ def deformation_pictures(plan: Plan) -> list[Picture]:
         caption += "; circles: strip minus given after the similarity alone"
     if any(isinstance(layer, Line) for panel in panels for layer in panel.layers):
         caption += "; the line: what the polynomial takes out, on the axis of the strip"
+    marks = [(panel.y, layer.at[:, 1]) for panel in panels for layer in panel.layers if isinstance(layer, Marks)]
+    beyond = sum(int(((at < y[0]) | (at > y[1])).sum()) for y, at in marks if y)
+    if beyond:
+        caption += f"; {counted(beyond, 'difference')} beyond {CUT:.0f} times the median at the ends of their axes"
     if len(shown) < len(sizes):
         caption += f". {len(shown)} of {len(sizes)} strips, those with the largest differences"
     words = counted(len(shown), "strip")
@@ -114,10 +119,19 @@ def _panels(plan: Plan, strip: str, after: Sequence[int], before: Sequence[Docum
                 hints = [f"{words} {plan.ids[after[n]]}: {shift[n, number]:+.3f} m" for n in own]
                 layers.append(Segments(places * (1.0, 0.0), places, f"{role} thin"))
                 layers.append(Marks(places, role, shape, hints, words, 4.0))
+        ranges = [layer.at[:, 1] for layer in layers if isinstance(layer, Line)]
+        ranges += [_held(part) for part in (missed[:, number], shift[:, number])]
         title = f"strip {strip}, {axis}" if len(plan.document["strips"]) > 1 else axis
         labels = f"{unit} along the strip" if strip else f"{unit} from the first photo", "m"
-        panels.append(Panel(layers, title, labels, x=reach))
+        panels.append(Panel(layers, title, labels, x=reach, y=span(np.concatenate(ranges))))
     return panels
+
+
+def _held(values: Floats) -> Floats:
+    """Cut off what is many times as large as most, so that one gross error leaves the others their size."""
+    sizes = np.abs(values[np.isfinite(values)])
+    most = CUT * float(np.median(sizes)) if len(sizes) else 0.0
+    return np.clip(values, -most, most)
 
 
 def _unit(reach: float) -> tuple[float, str]:
@@ -183,14 +197,35 @@ LIMITS = {"plan": 2.448, "height": 1.960}  # 95 % of a length in plan by its cov
 def check_pictures(document: Document) -> list[Picture]:
     """Draw check points over their standard deviations; nothing where these are not known."""
     rows: list[Document] = document.get("precision", {}).get("check", {}).get("points") or []
-    sizes = numbers(rows, *LIMITS)
+    caption = (
+        "Differences at check points over their standard deviations: in plan the length in the metric of the "
+        "covariance, in height with its sign. 95 % lie inside the band when these standard deviations are right."
+    )
+    words = "Check points against their precision", caption
+    return _over_their_sigma("check", words, "check point", [row["id"] for row in rows], numbers(rows, *LIMITS))
+
+
+def position_pictures(document: Document) -> list[Picture]:
+    """Draw what is left at camera positions over its standard deviations, photo by photo; nothing without any."""
+    rows: list[Document] = document.get("positions") or []
+    east, north, up = numbers(rows, *(f"normalised_{axis}" for axis in ("east", "north", "up"))).T
+    caption = (
+        "Differences at camera positions over their standard deviations, photo by photo: in plan both together, in "
+        "height with its sign; offset and drift are taken off. 95 % lie inside the band. "
+    )
+    words, sizes = ("Camera positions against their precision", caption), np.column_stack([np.hypot(east, north), up])
+    return _over_their_sigma("positions", words, "photo", [row["photo"] for row in rows], sizes)
+
+
+def _over_their_sigma(
+    name: str, said: tuple[str, str], what: str, names: Sequence[str], sizes: Floats
+) -> list[Picture]:
+    """Draw differences in plan and in height (n, 2) over their standard deviations, with the limits of 95 %."""
     if not np.isfinite(sizes).any():
         return []
-    ids = np.array([row["id"] for row in rows])
-    ends = 0.0, len(rows) + 1.0
-    panels = []
+    ids, ends, panels = np.array(names), (0.0, len(names) + 1.0), []
     for (part, limit), size in zip(LIMITS.items(), sizes.T, strict=True):
-        at = np.column_stack([np.arange(1, len(rows) + 1), size])
+        at = np.column_stack([np.arange(1, len(ids) + 1), size])
         worst = np.argsort(-np.abs(np.nan_to_num(size)), kind="stable")
         sides = np.array([[limit], [-limit if part == "height" else limit]])
         band = box(ends, (-limit if part == "height" else 0.0, limit))
@@ -198,21 +233,17 @@ def check_pictures(document: Document) -> list[Picture]:
         layers: list[Layer] = [Areas([band], "area c1")]
         layers.append(Segments(left, right, "failed dashed", words="limit of 95 %"))
         layers.append(Segments(at * (1.0, 0.0), at, "check thin"))
-        hints = np.array([f"check point {name}: {each:+.2f}" for name, each in zip(ids, size, strict=True)])
+        hints = np.array([f"{what} {one}: {each:+.2f}" for one, each in zip(ids, size, strict=True)])
         outside = np.abs(size) > limit
         looks = (~outside, "check", "square", "inside"), (outside, "failed open", "diamond", "outside")
         layers += [Marks(at[own], kind, shape, hints[own].tolist(), words, 4.0) for own, kind, shape, words in looks]
         known = [n for n in worst if np.isfinite(size[n])]
-        named = known[: max(int(outside.sum()), WORST_NAMED if len(rows) > MOST_NAMED else len(rows))]
+        named = known[: max(int(outside.sum()), WORST_NAMED if len(ids) > MOST_NAMED else len(ids))]
         layers.append(Names(at[named], ids[named].tolist()))
-        panels.append(Panel(layers, part, ("check points in their order", "d/σ"), x=ends, names=[""] * len(rows)))
-    caption = (
-        "Differences at check points over their standard deviations: in plan the length in the metric of the "
-        "covariance, in height with its sign. 95 % lie inside the band when these standard deviations are right."
-    )
+        panels.append(Panel(layers, part, (f"{what}s in their order", "d/σ"), x=ends, names=[""] * len(ids)))
     beyond = int((np.abs(sizes) > list(LIMITS.values())).any(axis=1).sum())
-    words = f"{counted(len(rows), 'check point')}, {beyond} outside the limits in plan or height."
-    return [chart("check", ("Check points against their precision", caption, words), panels)]
+    words = f"{counted(len(ids), what)}, {beyond} outside the limits in plan or height."
+    return [chart(name, (*said, words), panels)]
 
 
 # as the zones lie in the left photo, by rows: 3 and 4 on top, 1 and 2 on the base, 5 and 6 below

@@ -212,12 +212,13 @@ class Areas:
         """Return where the borders run, of outlines that are not filled."""
         if "open" not in self.kind or not self.outlines:
             return np.zeros((0, 2))
-        corners = [frame.places(outline, np.tile(outline.mean(axis=0), (len(outline), 1))) for outline in self.outlines]
-        return np.concatenate([between(each, np.roll(each, 1, axis=0)) for each in corners])
+        return np.concatenate([between(each, np.roll(each, 1, axis=0)) for each in self.corners(frame)])
+
+    def corners(self, frame: Frame) -> list[Floats]:
+        return [frame.places(outline, np.tile(outline.mean(axis=0), (len(outline), 1))) for outline in self.outlines]
 
     def draw(self, frame: Frame) -> Iterator[str]:
-        about = (np.tile(outline.mean(axis=0), (len(outline), 1)) for outline in self.outlines)
-        corners = [frame.places(*each).tolist() for each in zip(self.outlines, about, strict=True)]
+        corners = [each.tolist() for each in self.corners(frame)]
         if not self.hints:
             yield svg.element("path", d="".join(f"M{svg.joined(each)}z" for each in corners), kind=self.kind)
             return
@@ -366,7 +367,7 @@ class Panel:
             yield svg.text((x.start - 8.0, at + 4.0), words, "tick", "end")
         yield svg.text(((x.start + x.end) / 2, bottom + 38.0), self.labels[0], "axis", "middle")
         yield svg.text((x.start - 8.0, top - 12.0), self.labels[1], "axis", "end")
-        yield svg.text((x.start + 4.0, top - 12.0), fitted(self.title, x.end - x.start + RIGHT), "title")
+        yield svg.text((x.start + 4.0, top - 12.0), fitted(self.title, x.end - x.start + RIGHT, LETTER + 1.0), "title")
 
 
 @dataclass(frozen=True)
@@ -407,13 +408,13 @@ class Map:
         return Frame(x, y, self.rows, float(low[0]) + room, float(high[0] - low[0]) - 2.0 * room or 1.0, down)
 
     def surround(self, frame: Frame) -> Iterator[str]:
-        words = fitted(self.title, frame.x.end - frame.x.start)
+        words = fitted(self.title, frame.x.end - frame.x.start, LETTER)
         yield svg.text((frame.x.start + 2.0, frame.y.end - 5.0), words, "tick")
 
 
-def fitted(words: str, room: float) -> str:
+def fitted(words: str, room: float, letter: float) -> str:
     """Return words that fit, without their middle where they are too long."""
-    most = int(room / (LETTER + 1.0))
+    most = int(room / letter)
     return words if len(words) <= most else f"{words[: most // 2 - 1]}…{words[len(words) - most // 2 :]}"
 
 

@@ -155,7 +155,7 @@ def displacement_picture(document: Document) -> Picture:
             layers.append(Segments(at, at + factor * moved[own][:, pair], look))
             layers.append(Marks(at, look, "dot", hints, words))
         layers.append(Names(start[known][:, pair], [steps[n]["point"] for n in known]))
-        panels.append(Map(layers, f"{name}: {axes[pair[0]]} to the right, {axes[pair[1]]} upwards"))
+        panels.append(Map(layers, f"{name}: {axes[pair[0]]} →, {axes[pair[1]]} ↑"))
     timed = bool(document["times"])
     times = np.array([document["times"][epoch] if timed else n for n, epoch in enumerate(epochs, 1)], float)
     layers = []

@@ -314,7 +314,7 @@ MOST_PHOTOS = 300  # more of them are drawn as strips
 STRONG = 6  # points from which a tie is drawn thick
 FEW = 3  # points from which a tie is not weak
 LOOKS = {"thick": f"{STRONG} points and more", "": f"{FEW} to {STRONG - 1}", "dotted": f"fewer than {FEW}"}
-CROWDED = 4  # ties of a photo, from which the strong ones are hairlines, so that the weak ones show
+CROWDED = 3  # ties of a photo, from which the strong ones are hairlines, so that the weak ones show
 BOW = 0.16  # of a line: photos that are no neighbours lie on one line, and each of their ties is to be seen
 
 

@@ -240,7 +240,7 @@ def _histogram(plan: Plan, rays: Rays, known: Flags) -> Picture:
         Areas(boxes, "column", [counted(counts[n], "residual") for n in columns], what.partition(",")[0]),
         Line(np.column_stack([x, curve]), "c2", f"normal curve, σ = {sigma:.3g}{unit}"),
     ]
-    caption = f"How the {what} are distributed"
+    caption = f"How the {what}{',' if ',' in what else ''} are distributed"
     if limits:
         limit, ends = median(limits), (min(limits), max(limits))
         words = f"median limit ±{limit:.1f} µm" if unit else f"rejected beyond ±{limit:.2f}"

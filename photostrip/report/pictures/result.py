@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from photostrip.notes import Document
-from photostrip.report.pictures.along import check_pictures, deformation_pictures, parallax_pictures, precision_pictures
+from photostrip.report.pictures.along import (
+    check_pictures,
+    deformation_pictures,
+    parallax_pictures,
+    position_pictures,
+    precision_pictures,
+)
 from photostrip.report.pictures.places import plan_of
 from photostrip.report.pictures.plan import footprint_pictures, plan_picture, precision_maps, tie_pictures
 from photostrip.report.pictures.residuals import distortion_pictures, residual_pictures
@@ -16,6 +22,7 @@ SECTIONS = {
     "precision-height": "precision",
     "deformation": "control",
     "check": "check",
+    "positions": "positions",
     "residuals": "images",
     "image-plane": "images",
     "histogram": "images",
@@ -37,6 +44,7 @@ def pictures_of(document: Document) -> list[Picture]:
         *precision_maps(plan),
         *deformation_pictures(plan),
         *check_pictures(document),
+        *position_pictures(document),
         *residual_pictures(plan),
         *distortion_pictures(document),
     ]

@@ -16,6 +16,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[Document], Iterator[Part]]], ...] = (
     ("check", "Check points", points.check),
     ("cross-validation", "Cross-validation", points.cross_validation),
     ("control", "Control points", points.control),
+    ("positions", "Camera positions", points.positions),
     ("marks", "Marks of given points", points.marks),
     ("camera", "Adjusted camera", network.camera),
     ("precision", "Precision", points.precision),

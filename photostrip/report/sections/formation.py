@@ -74,7 +74,7 @@ def relative(document: Document) -> Iterator[Part]:
         f"{micrometres(worst['max_parallax_um'])} µm at point {worst['max_parallax_point']} of photos "
         f"{worst['left']} and {worst['right']}"
     )
-    redundant = counted(document["summary"]["redundancy"], "redundant point")
+    redundant = counted(sum(column_of(models, "redundancy")), "redundant point")
     yield Facts((("image coordinates", f"{pairs_line(document)}; {redundant}"), ("largest y parallax", largest)))
     pairs = (
         "left+right points_used points_rejected sigma0_um rms_parallax_um max_parallax_um max_parallax_point "

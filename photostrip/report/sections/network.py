@@ -32,6 +32,8 @@ ONE = {
     "position": "camera position coordinate",
     "attitude": "attitude angle",
 }
+AS_STATED = "in units of the stated standard deviations"
+ESTIMATED = "with the standard deviations of the variance components"
 NAMED = 6
 # How a cause is said; any other is that of a camera or of a photo.
 SENTENCES = {
@@ -78,7 +80,9 @@ def stages(document: Document, most: int) -> Iterator[Row]:
         test, out = block["sigma0_test"], sum(block["screening"].get("rejected", {}).values())
         said = "no redundancy to test it" if test["passed"] is None else _verdict(test)
         free = "free network, " if block["free_network"] else ""
-        text = f"{free}σ0 {fixed(block['sigma0'], 3)}, test {said}; {counted(out, 'observation')} rejected"
+        of_components = f"; {fixed(block['sigma0'], 3)} {ESTIMATED}" if len(block["variance_components"]) else ""
+        text = f"{free}σ0 {fixed(test['sigma0'], 3)}, test {said}{of_components}"
+        text += f"; {counted(out, 'observation')} rejected"
         yield "bundle adjustment", text
         yield from taken_up(block, most)
         yield from estimated(document, most)
@@ -121,7 +125,7 @@ def _adjustment(document: Document, units: str) -> Iterator[Part]:
         ("datum", free if block["free_network"] else "given by the observations"),
         ("observations", ", ".join(counted(number, ONE[kind]) for kind, number in block["observations"].items())),
         ("unknowns", f"{parts}; redundancy {block['redundancy']}"),
-        ("σ0", f"{short(block['sigma0'], 5)} in units of the stated standard deviations"),
+        ("σ0", f"{short(block['sigma0'], 5)} {ESTIMATED if len(block['variance_components']) else AS_STATED}"),
         ("test of σ0", said),
         ("gross errors", _screening(block["screening"])),
     )
@@ -135,8 +139,12 @@ def _screening(screening: Document) -> str:
         return "not searched for"
     out = ", ".join(counted(number, ONE[kind]) for kind, number in screening["rejected"].items() if number)
     test = {"tau": "tau test", "baarda": "Baarda's test"}[screening["test"]]
-    level = f"level {screening['alpha']:.2g} for one ray, limit {fixed(screening['limit'], 2)}"
-    return f"{screening['method']}, {test}, {level}: {out or 'none'} rejected, {screening['readmitted']} re-admitted"
+    limits = "; ".join(
+        f"{what} level {screening[f'alpha{of}']:.2g}, limit {fixed(screening[f'limit{of}'], 2)}"
+        for of, what in (("", "a ray"), ("_given", "a given coordinate"))
+    )
+    limits += f"; all over the σ0 found, {fixed(screening['unit'], 3)}" * (screening["unit"] > 1.0)
+    return f"{screening['method']}, {test}, {limits}: {out or 'none'} rejected, {screening['readmitted']} re-admitted"
 
 
 def reliability(document: Document) -> Iterator[Part]:
@@ -286,20 +294,10 @@ def estimated(document: Document, most: int) -> Iterator[Row]:
 
 def _cameras(block: Document, pixels: dict[str, float]) -> Iterator[tuple[str, float]]:
     """Give what was estimated of each camera, and the largest value in units of its standard deviation."""
-    rows = list(block["calibration"])
-    for camera, group in groupby(rows, key=itemgetter("camera")):
+    for camera, group in groupby(block["calibration"], key=itemgetter("camera")):
         own = list(group)
         said = ", ".join(_parameter(each, pixels.get(camera)) for each in own)
-        pairs = [
-            (value, _name(one), _name(other) + whose * (other["camera"] != camera))
-            for one in own
-            for other, value in zip(rows, one["correlations"], strict=False)
-            for whose in [f" of {other['camera'].removeprefix('of ')}"]
-            if other is not one and value is not None
-        ]
-        if pairs:
-            value, first, second = max(pairs, key=lambda pair: abs(pair[0]))
-            said += f"; largest correlation {value:+.2f}, {first} with {second}; all: --section camera"
+        said += "; with correlations: --section camera" * (len(own) > 1)
         yield f"camera {camera}: added {said}", _largest(own, "value", "sigma")
 
 

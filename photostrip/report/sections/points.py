@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import nlargest
 from itertools import groupby
 from math import fabs, hypot
@@ -72,7 +72,7 @@ def given_table(document: Document, given: Rows, role: str, most: int | None) ->
     known = (size for size, out in zip(given.values("normalised"), given.values("rejected"), strict=True) if not out)
     plan, height = summary[role]["plan"], summary[role]["height"]
     over = max((each for each in known if each is not None), default=None)
-    rms, mean, most_of_all = _sums(document, given)
+    rms, mean, most_of_all = _sums(_differences(document), given)
     rms |= {"plan_um": micrometres(plan["rms_um"]), "height_um": micrometres(height["rms_um"])}
     rms |= {"normalised": fixed(summary[role]["normalised"], 2)}
     most_of_all |= {"plan_um": micrometres(plan["max_um"]), "height_um": micrometres(height["max_um"])}
@@ -94,9 +94,13 @@ def _used(row: Document) -> str:
     return f"{kept} -{row['rejected']}".strip()
 
 
-def _sums(document: Document, rows: Rows) -> list[dict[str, str]]:
+def _differences(document: Document) -> list[tuple[str, str]]:
+    """Return the keys of differences with their axes."""
+    return list(zip(DIFFERENCES, document["frame"]["axes"], strict=True))
+
+
+def _sums(axes: Iterable[tuple[str, str]], rows: Rows) -> list[dict[str, str]]:
     """Return the lines below differences: rms, mean and largest along each axis of those that count."""
-    axes = zip(DIFFERENCES, document["frame"]["axes"], strict=True)
     values = {key: [row[key] for row in rows if row[key] is not None and _counts(row, axis)] for key, axis in axes}
     return [
         {"id": "rms"} | {key: metres(_rms(own)) for key, own in values.items()},
@@ -125,6 +129,22 @@ def _unused(document: Document) -> Iterator[Part]:
     }
     if facts := tuple((label, listed(names, IDS_NAMED)) for label, names in named.items() if names):
         yield Facts(facts)
+
+
+def positions(document: Document, most: int | None = None) -> Iterator[Part]:
+    """Give what is left at the camera positions that took part in the adjustment."""
+    rows = document.get("positions", ())
+    if not len(rows):
+        return
+    over = zip(*(rows.values(f"normalised_{axis}") for axis in LETTERS), strict=True)
+    worst = [max((fabs(each) for each in row if each is not None), default=0.0) for row in over]
+    shown, note = worst_first(rows, worst, ("camera position", "positions", "positions"), most)
+    below = note_of(note, "d/σ: difference over its standard deviation")
+    used = Field("use"), [_used(row) for row in shown]
+    foot = [{"photo": line.pop("id"), **line} for line in _sums([(f"d_{axis}", axis) for axis in LETTERS], rows)]
+    wrong = " A minus under `use`: found wrong, not used." * any(rows.values("rejected"))
+    yield Words(f"Adjusted minus given, offset and drift taken off.{wrong}")
+    yield keyed(shown, "photo used d_* normalised_* sigma_*:2", below, foot=foot, used=used)
 
 
 def check(document: Document, most: int | None = None) -> Iterator[Part]:
@@ -194,7 +214,7 @@ def _unseen(
         95 % limits.
     more: further columns.
     """
-    rms, *others = _sums(document, rows)
+    rms, *others = _sums(_differences(document), rows)
     rms |= {key: fixed(ratio, 2) for key, (ratio, _) in seen.items()}
     inside = {key: f"{part['inside_95']} of {part['count']}" for key, (_, part) in seen.items() if part["count"]}
     plan, height = seen
@@ -346,13 +366,8 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
 
 def _by_point(marks: Sequence[Document], unit: str, decimals: int) -> Table:
     """Sum up the marks of each given point, in the order of the list."""
-    columns = (
-        *map(Field, ("point", "role")),
-        Field("marks", " 0"),
-        *fields("rms largest", f"{unit} {decimals}"),
-        Field("photo", head="on"),
-    )
-    rows = []
+    sizes = fields("rms largest", f"{unit} {decimals}")
+    columns, rows = (Field("point"), Field("role"), Field("marks", " 0"), *sizes, Field("on")), []
     for _, group in groupby(marks, itemgetter("point")):
         own = list(group)
         worst = max(own, key=itemgetter("length"))

@@ -21,16 +21,7 @@ from photostrip.terrestrial.monitoring import monitor
 from tests.calls import rows, words
 from tests.loops import nonempty
 from tests.source_tree import ROOT
-from tests.terrestrial.simulated import (
-    CENTERS,
-    FOCAL,
-    TRUTH,
-    attitude,
-    coordinates,
-    photo,
-    project,
-    write,
-)
+from tests.terrestrial.simulated import CENTERS, FOCAL, TRUTH, attitude, coordinates, photo, project, write
 from tests.terrestrial.test_one_photo import CENTRE, PLACES, directions, from_the_theodolite
 
 if TYPE_CHECKING:

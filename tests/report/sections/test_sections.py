@@ -220,5 +220,6 @@ def test_every_section_has_a_name_and_keeps_its_place() -> None:
             found += sections
     assert tuple(found) == sections_of(document)
     assert missing == [
-        "findings", "cross-validation", "camera", "fiducials", "links", "models", "bundle", "classical", "certificate",
+        "findings", "cross-validation", "positions", "camera", "fiducials", "links", "models", "bundle", "classical",
+        "certificate",
     ]  # fmt: skip
