@@ -31,7 +31,7 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Finding
 from photostrip.pipeline import control_readings, evidence, shared_errors
 from photostrip.pipeline.control_readings import Reading
-from photostrip.pipeline.evidence import HeldStrip, ImageEvidence
+from photostrip.pipeline.evidence import HeldStrip, ImageEvidence, OnControl
 from photostrip.pipeline.formed_models import LinkedModels, link_strip
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import cartesian_of, rejected_control, rows_of_given
@@ -105,6 +105,7 @@ class OfStrip:
     slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
     mirrored: list[Finding] = field(default_factory=list)  # that it fits as its mirror image, without the cause
     confirmed: frozenset[int] = frozenset()  # control lists that it fits as they are given
+    with_positions: bool | None = None  # of a mirrored one: whether camera positions go with the control, or exchanged
 
 
 def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
@@ -119,7 +120,10 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
         return OfStrip(whole)
     better = control_readings.find_reading(held, points, control.read_in, as_given)
     mirrored: list[Finding] = []
+    with_positions: bool | None = None
     if better is not None:
+        if better.reading.mirrored:
+            with_positions = _with_positions(control, held, better.laid)
         into = mirrored if better.reading.mirrored else whole
         into.append(control_readings.named(better, as_given, held, control.frames))
     else:
@@ -128,7 +132,7 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
     laid, reading = (as_given, control_readings.AS_GIVEN) if better is None else (better.laid, better.reading)
     fits = better is None and as_given is not None and as_given.fits
     confirmed = frozenset(points.frame[held.given].tolist()) if fits else frozenset()
-    of_all = OfStrip(whole, mirrored=mirrored, confirmed=confirmed)
+    of_all = OfStrip(whole, mirrored=mirrored, confirmed=confirmed, with_positions=with_positions)
     if laid is None or not laid.fits or reading.rows or (whole and better is None):
         return of_all
     given = given_points.level(points.take(held.given), control.frames, as_written=control.as_written)
@@ -142,6 +146,33 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
     return of_all
 
 
+def _with_positions(control: GivenControl, held: HeldStrip, mirrored: OnControl) -> bool | None:
+    """Whether camera positions lie where a mirrored strip has its photos on the control as it is given.
+
+    Returns False where they lie over the control with its plan axes exchanged, and None where nothing tells.
+    """
+    given, photos = control.inputs.positions, held.stage.strip.photos
+    if given is None or control.as_written:
+        return None
+    rows = locate(photos, given.photos)
+    shown = (rows >= 0) & given.use[rows].all(axis=1)
+    exchanged = held.read(control_readings.PLAN_EXCHANGED(control.points), control.frames)
+    try:
+        tied, _ = tie_frames([given.frame, *control.inputs.frames], control.inputs.output or given.frame)
+        positions = tied[0].cartesian_from_ground(given.enu[rows[shown]])
+    except (GeometryError, InputError):
+        return None
+    off = []  # in bases
+    for laid in (mirrored, exchanged):
+        if laid is None or not shown.any():
+            return None
+        centers = laid.oriented.intermediate.cartesian_from_intermediate(laid.centers)
+        base = np.median(np.linalg.norm(np.diff(centers, axis=0), axis=1))
+        off.append(np.median(np.linalg.norm(centers[shown] - positions, axis=1)) / base)
+    is_told = min(off) < NEAR_BY * min(max(off), 1.0)  # a flight along north-east lies where it lay
+    return bool(off[0] < off[1]) if is_told else None
+
+
 def of_strips(
     control: GivenControl, stages: Iterable[FormedPhotos | LinkedModels], settings: Settings
 ) -> tuple[list[Finding], list[Finding]]:
@@ -150,9 +181,14 @@ def of_strips(
     mirrored = [finding for each in all_strips for finding in each.mirrored if control.axes_are_right is not False]
     shown = locate([name for each in mirrored for name in each.points], control.points.ids)
     confirmed = frozenset[int]().union(*(each.confirmed for each in all_strips))
-    right = "other strips fit it as it is" if confirmed & set(control.points.frame[shown].tolist()) else ""
-    right = "it lies where its crs is" if control.axes_are_right else right
-    whole = control_readings.of_mirrored(mirrored, control.inputs, control.frames, right)
+    whole = control_readings.of_mirrored(
+        mirrored,
+        control.inputs,
+        control.frames,
+        in_place=control.axes_are_right is True,
+        others_fit=not confirmed.isdisjoint(control.points.frame[shown].tolist()),
+        with_positions=next((each.with_positions for each in all_strips if each.with_positions is not None), None),
+    )
     whole += [finding for each in all_strips for finding in each.whole]
     return whole, [finding for each in all_strips for finding in each.slips]
 
@@ -257,6 +293,7 @@ def of_result(result: Result, predicted: Predicted, control: GivenControl) -> It
     yield from given_points.find_slips(given, predicted.off * scale, predicted.spread, asked=asked)
 
 
+NEAR_BY = 0.3  # of a base, or of how far off it is elsewhere, within which a camera position is that of its photo
 LEAST_POINTS = 3  # points that carry a similarity
 LEAST_BREADTH = 0.05  # second over first extent of control, below which it says nothing of the roll
 MOST_REFITS = 4  # of leaving out what does not fit
