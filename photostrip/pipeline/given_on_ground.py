@@ -35,7 +35,15 @@ from photostrip.pipeline.evidence import HeldStrip, ImageEvidence, OnControl
 from photostrip.pipeline.formed_models import LinkedModels, link_strip
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import cartesian_of, rejected_control, rows_of_given
-from photostrip.pipeline.inputs import GivenOrientations, Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.inputs import (
+    CameraPositions,
+    GivenOrientations,
+    Inputs,
+    MeasuredModels,
+    ModelStrip,
+    Settings,
+    Strip,
+)
 from photostrip.pipeline.results import Result
 from photostrip.plausibility import flight, found, given_points, units
 from photostrip.plausibility import flight as given_angles
@@ -316,6 +324,11 @@ class GivenCenters(NamedTuple):
     enu: Floats  # (n, 3)
     sigma: Floats  # (n, 3): standard deviations, metres; NaN where none is stated
 
+    @classmethod
+    def of(cls, key: str, given: CameraPositions | GivenOrientations, whole: Numbers) -> Self:
+        photos = tuple(given.photos[row] for row in whole.tolist())
+        return cls(key=key, frame=given.frame, photos=photos, enu=given.enu[whole], sigma=given.sigma[whole])
+
 
 class LevelPlan(NamedTuple):
     """Perspective centres and control points in one level plane: east, north and height, metres."""
@@ -398,25 +411,9 @@ def over_control(
 def _given_centers(inputs: Inputs, *, starts: bool) -> Iterator[GivenCenters]:
     positions, orientations = inputs.positions, inputs.orientations
     if positions is not None:
-        whole = np.flatnonzero(positions.use.all(axis=1))
-        photos = tuple(positions.photos[row] for row in whole)
-        yield GivenCenters(
-            key="camera_positions",
-            frame=positions.frame,
-            photos=photos,
-            enu=positions.enu[whole],
-            sigma=positions.sigma[whole],
-        )
+        yield GivenCenters.of("camera_positions", positions, np.flatnonzero(positions.use.all(axis=1)))
     if orientations is not None and (orientations.observed or starts):
-        whole = np.flatnonzero(np.isfinite(orientations.enu).all(axis=1))
-        photos = tuple(orientations.photos[row] for row in whole)
-        yield GivenCenters(
-            key="orientations",
-            frame=orientations.frame,
-            photos=photos,
-            enu=orientations.enu[whole],
-            sigma=orientations.sigma[whole],
-        )
+        yield GivenCenters.of("orientations", orientations, np.flatnonzero(np.isfinite(orientations.enu).all(axis=1)))
 
 
 def _usual(sigma: Floats) -> float:
@@ -792,24 +789,19 @@ class HeldCameras(NamedTuple):
 
 def _cameras(inputs: Inputs) -> HeldCameras | None:
     """Cameras whose position is given in full and takes part in a bundle; None without any."""
-    positions, orientations = inputs.positions, inputs.orientations
-    if positions is not None:
-        photos, enu, frame = positions.photos, positions.enu, positions.frame
-        whole = np.asarray(positions.use.all(axis=1), bool)
-    elif orientations is not None and orientations.observed:
-        photos, enu, frame = orientations.photos, orientations.enu, orientations.frame
-        whole = np.asarray(np.isfinite(enu).all(axis=1), bool)
-    else:
+    given = next(_given_centers(inputs, starts=False), None)
+    if given is None or not given.photos:
         return None
+    count = len(given.photos)
     points = ControlPoints(
-        ids=photos,
-        enu=enu,
-        use=np.repeat(whole[:, None], 3, axis=1),
-        check=np.zeros(len(enu), bool),
-        sigma=np.full(enu.shape, np.nan),
-        frame=np.full(len(enu), len(inputs.frames)),
+        ids=given.photos,
+        enu=given.enu,
+        use=np.ones((count, 3), bool),
+        check=np.zeros(count, bool),
+        sigma=np.full((count, 3), np.nan),
+        frame=np.full(count, len(inputs.frames)),
     )
-    return HeldCameras(points.take(whole), frame) if whole.any() else None
+    return HeldCameras(points, given.frame)
 
 
 def _of_block(

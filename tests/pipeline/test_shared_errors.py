@@ -35,13 +35,11 @@ def adjusted(
     rows: slice | np.ndarray = slice(None),
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
-    flight = Flight(photos=10, strips=strips)
-    simulation = simulate(Spec(seed=7, flight=flight, control=Control(bands=2), gnss=Gnss()))
+    simulation = simulate(Spec(seed=7, flight=Flight(photos=10, strips=strips), control=Control(bands=2), gnss=Gnss()))
     inputs = planted.with_gnss(np.random.default_rng(), simulation)
     assert inputs.positions is not None
     read = replace(inputs.positions, enu=inputs.positions.enu[rows] + np.asarray(shift, float))
-    inputs = replace(inputs, positions=read)
-    return simulation, triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
+    return simulation, blocks.adjusted(simulation, replace(inputs, positions=read))
 
 
 @pytest.mark.slow
