@@ -86,7 +86,7 @@ if TYPE_CHECKING:
 FIRST, PROOF = 100_000, 700_000  # seeds
 FEW, PROOF_PLANTED, PROOF_SOUND = 1, 14, 20  # projects of each kind
 WEAK = frozenset({"P501", "P502", "P503"})  # told of control that is weak indeed
-COMMON = frozenset({"P107", "P110", "P111", "P112", "P208"})  # told of what smooth image errors move in common
+COMMON = frozenset({"P107", "P110", "P111", "P112", "P208", "P209"})  # told of what smooth image errors move in common
 METHODS = ("polynomial", "bundle")
 FREE = ("principal_distance", "principal_point", "k1", "k2")
 SOME, MOST = 0.3, 0.7

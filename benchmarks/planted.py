@@ -358,7 +358,7 @@ def factor(*factors: float) -> Callable[[Case, Floats], Floats]:
     return lambda case, xy: xy * float(case.rng.choice(factors))
 
 
-def either(rng: np.random.Generator, low: float, high: float, size: int | None = None) -> Floats:
+def either(rng: np.random.Generator, low: float, high: float, size: int | tuple[int, int] | None = None) -> Floats:
     """Draw numbers from low to high of either sign."""
     return rng.choice([-1.0, 1.0], size) * rng.uniform(low, high, size)
 
@@ -867,9 +867,9 @@ def of_positions(change: Callable[[Case, Floats], Floats]) -> Plant:
     return plant
 
 
-def offset(case: Case, low: float, high: float) -> Floats:
-    """Draw an offset in all axes, in units of the noise, in the units of the frame."""
-    return either(case.rng, low, high, 3) * max(*case.noise, 0.1) * case.metre
+def offset(case: Case, low: float, high: float, rows: int = 1) -> Floats:
+    """Draw offsets in all axes, in units of the noise, in the units of the frame."""
+    return either(case.rng, low, high, (rows, 3)) * max(*case.noise, 0.1) * case.metre
 
 
 def one_high(case: Case, enu: Floats) -> Floats:
@@ -993,6 +993,8 @@ MISTAKES = (
     Mistake("camera positions that drift",
             of_positions(lambda case, enu: enu + np.linspace(0, 1, len(enu))[:, None] * offset(case, 40, 80)),
             ("P208",), 3, with_positions),
+    Mistake("camera positions worse than stated",
+            of_positions(lambda case, enu: enu + offset(case, 0, 40, len(enu))), ("P209",), 2, with_positions),
     Mistake("one id for two points", same_id, ("P301",), 3),
     Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), 3, block),
     Mistake("one id of two strips, polynomials", same_id_in_two_strips, ("P301",), 3, block, "polynomial"),

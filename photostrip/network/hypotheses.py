@@ -7,7 +7,9 @@ M = I - A Q A', the sum of squares would fall by w'H (H'M H)^-1 H'w with it. Tha
 the number of hypotheses counted, and is compared with those of single observations on one rank.
 
 A line of ``HYPOTHESES`` says who may be wrong, ``_columns`` how it would show, ``taken_up`` what the adjustment then
-does. The order of positions is no column: its errors are as large as the network, and it is asked about without them.
+does. Two are no columns. The order of positions has errors as large as the network, and is asked about without them.
+Standard deviations of positions that are k times too small explain by their likelihood: r k^2 of the sum of squares,
+r the redundancy of the positions, become r for a price of 2 r log k.
 Source: derived, see docs/sources.md.
 """
 
@@ -19,9 +21,10 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import fdtrc, gammaincc, gammaln
+from scipy.special import chdtr, chdtrc, fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.network import reliability
 from photostrip.network.adjustment import BundleSolution, Cofactors
 from photostrip.network.normal_equations import Columns, Explained
 from photostrip.network.observations import AFFINE, PRINCIPAL_DISTANCE, K, P, by_calibration, values_of
@@ -33,8 +36,10 @@ from photostrip.network.problem import (
     PositionObservations,
     StartValues,
 )
+from photostrip.statistics import normal_quantile
 
 ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
+SIGMAS = "standard deviations of positions"
 LENS, EDGE, DECENTRED = "lens distortion", "lens distortion at the edge", "decentred lens"
 FILM, POINT, DISTANCE = "film", "principal point", "principal distance"
 SHIFT, SCALE = "shift of a photo", "scale of a photo"
@@ -62,11 +67,17 @@ SHARED = 0.1  # of the level of all tests: what an accusation may cost that sing
 MOST_ASKED = 4  # positions of which any two may be exchanged: those that go least with the photos
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-9  # of a column that the other unknowns leave to it, for it to be more than rounding
+MIDDLE = normal_quantile(0.75)  # of standardised residuals: half of them are smaller
+COUNTED = 1.5  # standard deviations that a residual counts as at most, where these are estimated
+EXPECTED = float(chdtr(3, COUNTED**2) + COUNTED**2 * chdtrc(1, COUNTED**2))  # of such squares, of good residuals
+ROUNDS = 30  # of that estimate: the outermost residuals enter one after the other
 ALIKE = 1e-6  # of columns of one hypothesis, from which they are one
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
 OTHER_HEIGHTS = 0.5, 2.0  # of photos above what they show, from which a principal distance is found, too
 UP_AXIS = 2
 HEIGHTS_ONLY = -1  # in place of the number of a list: what is given in height only
+PARTS = slice(UP_AXIS), slice(UP_AXIS, None)  # of coordinates: plan and height, whose standard deviations differ
+UNSCALED = (1.0,) * len(PARTS)
 
 
 @dataclass(frozen=True)
@@ -81,6 +92,7 @@ class Hypothesis:
     # shift, sigma: how a list lies beside everything else, along its axes, metres; NaN where it gives nothing
     shift: tuple[float, ...] = ()
     sigma: tuple[float, ...] = ()
+    factors: tuple[float, ...] = UNSCALED  # of the standard deviations of positions, by ``PARTS``
 
     @property
     def name(self) -> tuple[str, int, str]:
@@ -354,6 +366,9 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
         return replace(problem, control=control)
     if hypothesis.kind == ORDER:
         return replace(problem, positions=_in_order(positions, hypothesis))
+    if hypothesis.kind == SIGMAS:
+        factor = np.repeat(hypothesis.factors, [UP_AXIS, 1])
+        return replace(problem, positions=replace(positions, sigma=positions.sigma * factor))
     if hypothesis.kind in OF_PHOTOS:
         return _with_own_camera(problem, hypothesis.number, OF_PHOTOS[hypothesis.kind])
     if hypothesis.kind in OF_CAMERAS:
@@ -433,6 +448,57 @@ def log_probability_again(without: BundleSolution, hypothesis: Hypothesis, unit:
     (explained,) = _explained(without, [hypothesis])
     gain = _gain(explained)
     return log_probability(max(gain.squares, 0.0) / unit**2, max(len(gain.value), 1))
+
+
+class Scatter(NamedTuple):
+    """How far camera positions scatter about where all else puts them, in plan and in height."""
+
+    factors: Floats  # (2,): in units of their standard deviations; 1 where too little controls them
+    redundancy: Floats  # (2,)
+
+    @classmethod
+    def of(cls, solution: BundleSolution, cofactors: Cofactors) -> Scatter:
+        """Estimate robustly, each residual counting as ``COUNTED`` standard deviations at most.
+
+        A third of them may be wrong. Source: [Huber 1964], proposal 2.
+        """
+        factors, redundancy = np.ones(len(PARTS)), np.zeros(len(PARTS))
+        (group,) = reliability.groups_of(solution.prepared.problem, solution, cofactors, (reliability.POSITION,))
+        for n, axes in enumerate(PARTS):
+            known = np.isfinite(group.standardised[:, axes])
+            squares, share = group.standardised[:, axes][known] ** 2, group.redundancy[:, axes][known]
+            redundancy[n] = share.sum()
+            if redundancy[n] >= reliability.LEAST_REDUNDANCY:
+                variance = float(np.median(squares)) / MIDDLE**2
+                for _ in range(ROUNDS):
+                    variance = float(share @ np.minimum(squares, COUNTED**2 * variance)) / (EXPECTED * redundancy[n])
+                factors[n] = np.sqrt(variance)
+        return cls(factors, redundancy)
+
+
+def factors_of(common: Sequence[Hypothesis]) -> tuple[float, ...]:
+    """Return the factors of the standard deviations of positions among what was taken up."""
+    return next((each.factors for each in common if each.kind == SIGMAS), UNSCALED)
+
+
+def price(scatter: Scatter, factors: Floats | Sequence[float]) -> float:
+    """Return what standard deviations multiplied with factors cost of the sum of squares that they explain."""
+    return float(2.0 * (scatter.redundancy * np.log(factors)).sum())
+
+
+def of_scatter(scatter: Scatter, unit: float, taken: Floats, level: float) -> Likely | None:
+    """Ask whether standard deviations of positions are too small; or too large, after they were multiplied.
+
+    taken: factors by which they were multiplied.
+    level: logarithm of the level at which they are multiplied again; of each part by itself.
+    """
+    factors = np.maximum(scatter.factors / unit, 1.0 / taken)
+    squares = scatter.redundancy * (factors**2 - 1.0 - 2.0 * np.log(factors))
+    asked = np.array([log_probability_of_any(each, 1, len(PARTS)) <= level for each in squares.tolist()])
+    if not asked.any():
+        return None
+    hypothesis = Hypothesis(SIGMAS, of=ALL, factors=tuple(np.where(asked, factors, 1.0).tolist()))
+    return Likely.of(hypothesis, float(squares[asked].sum()), int(asked.sum()), len(PARTS))
 
 
 def _in_order(positions: PositionObservations, order: Hypothesis) -> PositionObservations:

@@ -298,7 +298,7 @@ def _named(ratio: Floats, name: Callable[[int, int, int], tuple[str, str]], *, l
     return [Correlation(*name(*places[k].tolist()), float(values[k])) for k in order]
 
 
-IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
+IMAGE, CONTROL, POSITION, ATTITUDE = KINDS = "image", "control", "position", "attitude"
 SIGMA0_LEVEL = 0.05  # at which a search takes stated standard deviations for too small
 
 
@@ -344,15 +344,17 @@ class Group:
             return np.asarray(shift * np.sqrt((1.0 - r) / r), float)
 
 
-def groups_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Group, ...]:
-    """All observations with their redundancy numbers, image coordinates first; empty kinds are left out."""
+def groups_of(
+    problem: BundleProblem, solution: BundleSolution, precision: Cofactors, kinds: Sequence[str] = KINDS
+) -> tuple[Group, ...]:
+    """Observations of some kinds with their redundancy numbers, image coordinates first; empty kinds are left out."""
     found = [
         (IMAGE, solution.image_residuals, problem.images.sigma, precision.image_residuals),
         (CONTROL, -solution.control_residuals, problem.control.sigma, precision.control_residuals),
         (POSITION, -solution.position_residuals, problem.positions.sigma, precision.position_residuals),
         (ATTITUDE, -solution.attitude_residuals, problem.attitudes.sigma, precision.attitude_residuals),
     ]
-    return tuple(_group(*each) for each in found if len(each[1]))
+    return tuple(_group(*each) for each in found if len(each[1]) and each[0] in kinds)
 
 
 def require_regular(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> None:
@@ -447,10 +449,7 @@ class Limit(NamedTuple):
 
     def shifts(self, power: float) -> dict[str, float]:
         """Give ``noncentrality`` for each kind of observation."""
-        return {
-            kind: noncentrality(self.alpha if kind == IMAGE else self.alpha_of_given, power)
-            for kind in (IMAGE, CONTROL, POSITION, ATTITUDE)
-        }
+        return {kind: noncentrality(self.alpha if kind == IMAGE else self.alpha_of_given, power) for kind in KINDS}
 
 
 def tests_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> int:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from math import comb, log
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import xlogy
@@ -29,9 +30,12 @@ from photostrip.network.hypotheses import (
     OFFSET,
     ORDER,
     PLAINER,
+    SIGMAS,
+    UNSCALED,
     UP_AXIS,
     Hypothesis,
     Likely,
+    Scatter,
 )
 from photostrip.network.problem import BundleProblem, BundleSettings, PositionObservations
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, JointCofactors, Limit, cofactors_of
@@ -54,6 +58,7 @@ from photostrip.strip.pair_screening import AMPLE, OUT_TO_ONE_MORE
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on
 RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before anything is decided on again
+SCALED = 0.02  # of standard deviations of positions, by which they may still grow
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -95,6 +100,15 @@ class ScreenedBundle:
     def joint(self) -> JointCofactors:
         return JointCofactors.of_solution(self.solution)
 
+    @cached_property
+    def scatter(self) -> Scatter:
+        return Scatter.of(self.solution, self.precision)
+
+    def left(self, unit: float, factors: Sequence[float]) -> float:
+        """Sum of squares that is left, with the price of factors of the standard deviations of positions."""
+        paid = 0.0 if factors == UNSCALED else hypotheses.price(self.scatter, factors)
+        return self.solution.chi_square / unit**2 + paid
+
 
 def screen_bundle(
     problem: BundleProblem,
@@ -118,7 +132,8 @@ def screen_bundle(
         return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
     search = _Search(problem, begin, settings, kept, rough=rough)
     done = _searched(search, begin)
-    taken = [*search.common, *search.refused]
+    # standard deviations stay: their factor is that of most positions, whichever others are wrong
+    taken = [each for each in (*search.common, *search.refused) if each.kind != SIGMAS]
     lost = done.held or any(each.kind != IMAGE and not each.readmitted for each in done.rejections)
     if not (taken and lost) and not any(each.kind in OF_PHOTOS for each in taken):
         return done
@@ -141,7 +156,7 @@ def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> floa
     asked = rays_out, given_out, photos, len(done.common) - photos
     numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
     price = 2.0 * xlogy(asked, np.array(numbers) / level).sum()  # of nothing that is asked of nothing: 0
-    return float(done.solution.chi_square / unit**2 + price)
+    return done.left(unit, hypotheses.factors_of(done.common)) + float(price)
 
 
 def _plainer(hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -160,6 +175,25 @@ def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
     done = replace(done, rejections=tuple(search.log(done)), held=held, doubted=search.doubted(done))
     return replace(done, rounds=search.rounds, common=tuple(search.common))
+
+
+class _Tried(NamedTuple):
+    """A hypothesis that was adjusted with."""
+
+    hypothesis: Hypothesis
+    found: ScreenedBundle
+    problem: BundleProblem  # with its unknowns, to go on with
+
+    def explained(self, done: ScreenedBundle, unit: float) -> Likely:
+        """Say what the sum of squares fell by."""
+        before, after = done.solution, self.found.solution
+        fall = (before.chi_square - after.chi_square) / unit**2
+        return Likely.of(self.hypothesis, fall, before.redundancy - after.redundancy, 1)
+
+
+def _unit(tried: Sequence[_Tried]) -> float:
+    """Return the sigma0 to compare by: what is wrong makes it large, the right cause does not."""
+    return max(min(each.found.solution.sigma0 for each in tried), 1.0)
 
 
 class _Search:
@@ -324,35 +358,97 @@ class _Search:
         Those that explain it nearly alike are adjusted with: what contradicts the rest by a hundred standard deviations
         bends the network further than it can be linearised.
         """
-        of_worst = self._log_p(done, worst)
-        likely_ones = self._likeliest(done, of_worst)
-        if likely_ones and (reordered := self._reordered(done.selection)) is not None:
+        likely_ones, scaled = self._likeliest(done, self._log_p(done, worst)), self._scaled(done)
+        if (likely_ones or scaled) and (reordered := self._reordered(done.selection)) is not None:
             return self.adjust(supported(self.problem, reordered))
-        before, solution, tried = self.problem, done.solution, {}
+        before, tried = self.problem, []
         for each in likely_ones:
             found = self._with(each.hypothesis, done.selection)
             if found is None:
                 self.refused.append(each.hypothesis)
             else:
-                tried[each.hypothesis.name] = each.hypothesis, found, self.problem
+                tried.append(_Tried(each.hypothesis, found, self.problem))
             self.problem = before
-        if not tried:
+        chosen = self._explaining_most(done, tried) if tried else None
+        if scaled is not None:
+            chosen = self._rather_scaled(done, scaled, tried, worst) or chosen
+        if chosen is None:
             return None
-        # what is wrong makes sigma0 large: the hypotheses are compared by what it becomes
-        unit = max(min(found.solution.sigma0 for _, found, _ in tried.values()), 1.0)
-        adjusted = [
-            Likely.of(
-                hypothesis,
-                (solution.chi_square - found.solution.chi_square) / unit**2,
-                solution.redundancy - found.solution.redundancy,
-                1,
-            )
-            for hypothesis, found, _ in tried.values()
-        ]
+        self.problem = chosen.problem
+        again = chosen is scaled and hypotheses.factors_of(self.common) != UNSCALED
+        self.common = [each for each in self.common if not (again and each.kind == SIGMAS)] + [chosen.hypothesis]
+        if chosen is not scaled or again:
+            return chosen.found
+        return self.adjust(supported(self.problem, self._with_all_positions(chosen.found.selection)))
+
+    def _explaining_most(self, done: ScreenedBundle, tried: Sequence[_Tried]) -> _Tried:
+        """Return the hypothesis with which the sum of squares fell most."""
+        unit = _unit(tried)
+        adjusted = [each.explained(done, unit) for each in tried]
         likely = hypotheses.most_likely(adjusted, self.settings.level)
-        _, found, self.problem = tried[likely.hypothesis.name]
-        self.common.append(likely.hypothesis)
-        return found
+        (chosen,) = (each for each in tried if each.hypothesis.name == likely.hypothesis.name)
+        return chosen._replace(hypothesis=likely.hypothesis)
+
+    def _scaled(self, done: ScreenedBundle) -> _Tried | None:
+        """Multiply the standard deviations of positions until these scatter as far; None where they do so already."""
+        taken, before = np.array(hypotheses.factors_of(self.common)), self.problem
+        if not done.selection.positions.any() or any(each.kind == SIGMAS for each in self.refused):
+            return None
+        likely = hypotheses.of_scatter(done.scatter, done.limit.unit, taken, self._level)
+        if likely is None:
+            return None
+        found, total, step = done, taken, np.array(likely.hypothesis.factors)
+        asked = step != 1.0
+        try:
+            for _ in range(reliability.ITERATIONS):
+                total = total * step
+                scaling = replace(likely.hypothesis, factors=tuple(step.tolist()))
+                self.problem = hypotheses.taken_up(self.problem, scaling)
+                found = self.adjust(supported(self.problem, done.selection))
+                step = np.where(asked, np.maximum(found.scatter.factors / found.limit.unit, 1.0 / total), 1.0)
+                if (np.abs(step - 1.0) < SCALED).all():
+                    break
+            return _Tried(replace(likely.hypothesis, factors=tuple(total.tolist())), found, self.problem)
+        except GeometryError:
+            return None
+        finally:
+            self.problem = before
+
+    def _rather_scaled(
+        self, done: ScreenedBundle, scaled: _Tried, tried: Sequence[_Tried], worst: list[Rejection] | WrongRays
+    ) -> _Tried | None:
+        """Return larger standard deviations of positions, or what must be taken up before; None: others explain more.
+
+        Whatever else is wrong makes positions scatter, too: those with which they would scatter less go before.
+        """
+        unit, taken = _unit([*tried, scaled]), hypotheses.factors_of(self.common)
+        factors = scaled.hypothesis.factors
+        step = np.array(factors) / taken
+        asked = step != 1.0
+        # wrong ones among them, whose squares would count as explained, add nothing to what most of them explain
+        by_most = (done.scatter.redundancy * step**2 - scaled.found.scatter.redundancy)[asked].sum()
+        by_most -= hypotheses.price(scaled.found.scatter, step)
+        explained = min(done.left(unit, taken) - scaled.found.left(unit, factors), by_most)
+        log_p = Likely.of(scaled.hypothesis, explained, int(asked.sum()), len(asked)).log_p
+        of_worst = self._log_p(replace(done, limit=done.limit._replace(unit=unit)), worst)
+        if log_p > min([of_worst, self._level, *(each.explained(done, unit).log_p for each in tried)]):
+            return None
+        before, first = self.problem, []
+        number = len(OF_CAMERAS) + len(OF_PHOTOS) * before.photos
+        for each in tried:
+            self.problem = each.problem
+            both = self._scaled(each.found)
+            by = taken if both is None else both.hypothesis.factors
+            fall = hypotheses.price(scaled.found.scatter, np.array(factors) / by)
+            freedom = done.solution.redundancy - each.found.solution.redundancy
+            likely = Likely.of(each.hypothesis, fall, freedom, number)
+            if likely.log_p <= self._level:
+                first.append(likely)
+        self.problem = before
+        if not first:
+            return scaled
+        name = hypotheses.most_likely(first, self.settings.level).hypothesis.name
+        return next(each for each in tried if each.hypothesis.name == name)
 
     def _with(self, hypothesis: Hypothesis, selection: Selection) -> ScreenedBundle | None:
         """Adjust a selection with a hypothesis, from the first of its starts that leads to an end; None: none does."""
@@ -405,6 +501,10 @@ class _Search:
         without = self._with_all(others)
         selection = supported(without, self._counting(done.selection))
         try:
+            if hypothesis.kind == SIGMAS:
+                unit, bare = done.limit.unit, ScreenedBundle.of(without, selection, self.settings)
+                fall = bare.left(unit, UNSCALED) - done.left(unit, hypothesis.factors)
+                return hypotheses.log_probability_of_any(max(fall, 0.0), 1, len(UNSCALED))
             if hypothesis.kind == ORDER:
                 return -np.inf if self._order(without, selection)[1] == hypothesis else 0.0
             solution = solve(selected(without, selection))
@@ -429,6 +529,10 @@ class _Search:
             return None
         self.problem = restarted(self.problem, solution)
         self._take_up(found)
+        return self._with_all_positions(selection)
+
+    def _with_all_positions(self, selection: Selection) -> Selection:
+        """Put positions back that went by another order, or by smaller standard deviations."""
         self.out = {key: each for key, each in self.out.items() if key[0] != POSITION}
         return replace(selection, positions=Selection.everything(self.problem).positions)
 

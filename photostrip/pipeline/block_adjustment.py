@@ -593,7 +593,8 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
     """Adjust once, with what the search in an adjustment with more control has found."""
     asked, problem = block.problem.common_names(), block.problem
     for shared in before.screened.common:
-        problem = taken_up(problem, shared)
+        if not (before.components and shared.kind == hypotheses.SIGMAS):  # they hold its factors
+            problem = taken_up(problem, shared)
     problem = reliability.scaled(problem, before.components, block.level)
     screened = ScreenedBundle.of(problem, supported(problem, block.begin), settings.bundle)
     screened = replace(screened, common=before.screened.common)
@@ -632,6 +633,9 @@ def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
     again = (each for each in final.rejections if (each.kind, each.row) not in known)
     common = *screened.common, *final.common
     final = replace(final, rejections=(*screened.rejections, *again), common=common)
+    plan, up = hypotheses.factors_of(screened.common)
+    taken = {"positions plan": plan, "positions height": up, "positions": float(np.cbrt(plan**2 * up))}
+    found = tuple(replace(each, factor=each.factor * taken.get(each.name, 1.0)) for each in found)
     return before._replace(block=block, screened=final, components=found)
 
 

@@ -8,7 +8,7 @@ something may be common to all heights or to one list (``find_shared``).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -108,9 +108,10 @@ AS_GIVEN = Reading("", "", "")
 DISTANCE = Reading("P105", "", "", distance=np.nan)  # which is estimated
 MIRRORED = Reading("P401", "", "", mirrored=True)  # of several causes, which fit alike
 EXCHANGED = (1, 0, 2)  # columns of the plan
+PLAN_EXCHANGED = _columns(*EXCHANGED)
 READINGS = (
     MIRRORED,
-    _columns(*EXCHANGED),  # which degrees, and places with another map scale, tell from a mirror image
+    PLAN_EXCHANGED,  # which degrees, and places with another map scale, tell from a mirror image
     _columns(*EXCHANGED, of_list=True),
     _columns(2, 1, 0),
     _columns(0, 2, 1),
@@ -160,7 +161,7 @@ def find_reading(
     smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
     ways = [(each, number) for each in READINGS for number in (smaller if each.of_list else [None])]
     best, least, price = None, np.inf, float(np.log(len(ways) / LEVEL))
-    if as_given is not None:
+    if as_given is not None and not as_given.is_buried:
         if _excess(as_given) < price and not as_given.found.out:
             return None
         least = _cost(as_given, AS_GIVEN) - price
@@ -289,55 +290,77 @@ def named(better: Better, as_given: OnControl | None, held: HeldStrip, frames: S
     before = "cannot be laid on its control as it is given"
     if as_given is not None:
         before = f"is {_size(as_given):.3g} m off its control as it is given"
-    head = f"strip {strip} {before}, and {_size(tried):.2g} m if"
+        before = "would lie below its control as it is given" if as_given.is_buried else before
+    head = f"strip {strip} {before}, and {_size(tried):.2g} m off it if"
     if reading.distance != 1.0 and isinstance(held.stage, FormedPhotos):
         return _of_distance(held.stage.strip, reading.distance, head, numbers)
     if reading.mirrored:
         return found(reading.code, f"{head} it is mirrored", "", numbers, points=tried.points.ids, strips=(strip,))
     lists = np.unique(tried.points.frame).tolist() if number is None else [number]
-    fix = reading.fix or f"write {axes_to_write(frames, reading.order, lists)}"
+    axes_of = {f"control[{each}]": frames[each].axes for each in lists}
+    fix = reading.fix or f"write {axes_to_write(axes_of, reading.order)}"
     points = () if number is None else tried.points.take(tried.points.frame == number).ids
     return found(reading.code, f"{head} {reading.text}", fix, numbers, points=points, strips=(strip,), key=key)
 
 
-def axes_to_write(frames: Sequence[GroundFrame], order: tuple[int, int, int], lists: Sequence[int]) -> str:
-    """Say which axes the project file must give to some lists, so that these columns are east, north, up."""
-    written = []
-    for place in lists:
-        names = CARTESIAN_AXES if "x" in frames[place].axes else GROUND_AXES
-        columns = [names[order.index(names.index(axis))] for axis in frames[place].axes]
-        written.append(f"`control[{place}].axes: [{', '.join(columns)}]`")
-    return " and ".join(written)
+def axes_to_write(axes_of: Mapping[str, Sequence[str]], order: tuple[int, int, int]) -> str:
+    """Say which axes the project file must give to some of its lists, so that these columns are east, north, up."""
+    columns = {key: [GROUND_AXES[order.index(place)] for place in _places(axes)] for key, axes in axes_of.items()}
+    if any("x" in axes for axes in axes_of.values()):
+        columns = {key: [CARTESIAN_AXES[GROUND_AXES.index(axis)] for axis in each] for key, each in columns.items()}
+    return " and ".join(f"`{key}.axes: [{', '.join(each)}]`" for key, each in columns.items())
+
+
+def _places(axes: Sequence[str]) -> list[int]:
+    """Which of the axes each column is, 0 to 2."""
+    return [(CARTESIAN_AXES if "x" in axes else GROUND_AXES).index(axis) for axis in axes]
 
 
 def of_mirrored(
-    findings: Sequence[Finding], inputs: Inputs, frames: Sequence[GroundFrame], right: str
+    findings: Sequence[Finding],
+    inputs: Inputs,
+    frames: Sequence[GroundFrame],
+    *,
+    in_place: bool,
+    others_fit: bool,
+    with_positions: bool | None,
 ) -> list[Finding]:
     """Name what may have mirrored strips, all of them together (P103, P401).
 
     Two axes of the control exchanged, those of the photos, or one of them turned: each fits as well as the others. What
-    tells them apart is the place of the control on the Earth, strips that fit it as it is, lists of both hands, and a
-    format that holds the points one way only.
+    tells them apart is the place of the control on the Earth, strips that fit it as it is, camera positions, lists of
+    both hands, and a format that holds the points one way only.
 
     findings: of each strip that fits as its mirror image, with the control that it shows.
-    right: what tells that the axes of the control are right; empty where nothing does.
+    in_place, others_fit: whether the axes of the control are right, as its place or other strips tell.
+    with_positions: whether camera positions go with the control as it is given, or as it is exchanged; None unknown.
     """
     if not findings:
         return []
     strips, points = (tuple(name for each in findings for name in getattr(each, kind)) for kind in ("strips", "points"))
     lists = np.unique(inputs.control.frame[locate(points, inputs.control.ids)]).tolist()
-    hands = {round(float(np.linalg.det(np.eye(3)[list(frames[number].order)]))) for number in lists}
+    axes_of = {f"control[{number}]": frames[number].axes for number in lists}
+    if with_positions and inputs.positions is not None:
+        axes_of["camera_positions"] = inputs.positions.frame.axes
+    hands = {round(float(np.linalg.det(np.eye(3)[_places(axes)]))) for axes in axes_of.values()}
     causes, told = _of_photos([strip for strip in inputs.strips if strip.id in strips], inputs)
-    right = right or ("its lists, of both hands, agree" if len(hands) > 1 else "")
+    why = "camera positions lie over it only so" if with_positions is False else ""
+    if why:
+        causes, told = {}, False
+    right = "lists of both hands agree" if len(hands) > 1 else ""
+    right = "other strips fit it as it is" if others_fit else "it lies where its crs is" if in_place else right
     by_control = not (right or told)
     if by_control:
         two = "two of X, Y, Z" if "x" in frames[lists[0]].axes else "east and north"
-        backwards = ", or one of them counts backwards" if frames[lists[0]].kind == "local" else ""
-        causes = {f"{two} of the control are exchanged{backwards}": axes_to_write(frames, EXCHANGED, lists)} | causes
+        of_both = " and of the camera positions" if with_positions else ""
+        backwards = ", or one of them counts backwards" if frames[lists[0]].kind == "local" and not why else ""
+        causes = {f"{two} of the control{of_both} are exchanged{backwards}": axes_to_write(axes_of, EXCHANGED)} | causes
     head = f"strips {listed(strips)} are mirrored: " if len(strips) > 1 else ""
-    why = "their format holds the points only so" if told else right and f"the control is right: {right}"
+    why = "their format holds the points only so" if told else f"the control is right: {right}" if right else why
     message = f"{head}{findings[0].message}: {', or '.join(causes)}{why and f' ({why})'}"
     fix = f"write {', or '.join(causes.values())}" + ("; all fit alike" if len(causes) > 1 else "")
+    if others_fit:
+        fix = "correct the rows of its photos, and nothing that the project says of all"
     key = "control" if by_control else "models" if inputs.models is not None else "observations"
     return [found("P401" if by_control else "P103", message, fix, findings[0].evidence, strips=strips, key=key)]
 

@@ -361,7 +361,27 @@ class OnControl:
     counted: StripAtControl  # those that are not far away
     kept: Flags  # (n, 3): coordinates that the others predict
     found: FoundErrors  # what they do not predict, far points aside
-    looks_down: bool | None  # whether its photos look down upon the control; None of models, where no centre tells it
+    oriented: OrientedStrip  # the strip as it was laid
+
+    @cached_property
+    def looks_down(self) -> bool | None:
+        """Whether its photos look down upon the control; None of models without perspective centres."""
+        stage = self.oriented.stage
+        if isinstance(stage, LinkedModels) and not stage.formed.upright:
+            return None
+        axis = up(stage) if isinstance(stage, FormedPhotos) else np.array([0.0, 0.0, 1.0])
+        return bool(self.oriented.absolute.similarity.rotation[2] @ axis > LEAST_DOWN)
+
+    @property
+    def centers(self) -> Floats:
+        """Perspective centres (n, 3) of its photos, intermediate frame, metres."""
+        return self.oriented.absolute.similarity(self.oriented.formed.centers)
+
+    @cached_property
+    def is_buried(self) -> bool:
+        """Whether its photos do not look down, and their perspective centres lie below the control."""
+        heights = self.centers[:, 2]
+        return self.looks_down is False and bool(np.median(heights) < np.median(self.oriented.at_control[:, 2]))
 
     @cached_property
     def left(self) -> JointAdjustment:
@@ -397,15 +417,6 @@ class OnControl:
                 cofactor = others.cofactor(part).diagonal() * max(self.variance, 1.0)
                 sigma[where] = np.sqrt(np.maximum(cofactor, 0.0)) / others.size[part]
         return off, sigma
-
-
-def _looks_down(oriented: OrientedStrip) -> bool | None:
-    """Whether the photos of a strip on its control look down upon it; None of models without perspective centres."""
-    stage = oriented.stage
-    if isinstance(stage, LinkedModels) and not stage.formed.upright:
-        return None
-    axis = up(stage) if isinstance(stage, FormedPhotos) else np.array([0.0, 0.0, 1.0])
-    return bool(oriented.absolute.similarity.rotation[2] @ axis > LEAST_DOWN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -498,7 +509,7 @@ class HeldStrip:
             kept[some] = kept_of(at_counted, found)
         except (PhotostripError, np.linalg.LinAlgError):
             return None
-        return OnControl(points, at_all, at_counted, kept, found, _looks_down(oriented))
+        return OnControl(points, at_all, at_counted, kept, found, oriented)
 
     def lies_on(self, control: ControlPoints, frames: Sequence[GroundFrame]) -> bool:
         """Whether the strip can be laid on its control at all, as that is read."""

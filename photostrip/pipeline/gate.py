@@ -150,6 +150,11 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     causes = [] if result.bundle is None else list(shared_errors.of_bundle(result.bundle, inputs, result.settings))
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
     odd = {each.strip.id for each in formed if given_on_ground.is_doubtful(each, result, predicted)}
+    odd |= {
+        each.strip.id
+        for each in result.photo_strips
+        if np.median(each.placed.centers[:, 2]) < np.median(each.xyz[:, 2])
+    }
     doubtful = [each for each in formed if misread or each.strip.id in odd]
     findings = [*images.findings]
     findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None)

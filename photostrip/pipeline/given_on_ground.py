@@ -31,11 +31,19 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Finding
 from photostrip.pipeline import control_readings, evidence, shared_errors
 from photostrip.pipeline.control_readings import Reading
-from photostrip.pipeline.evidence import HeldStrip, ImageEvidence
+from photostrip.pipeline.evidence import HeldStrip, ImageEvidence, OnControl
 from photostrip.pipeline.formed_models import LinkedModels, link_strip
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import cartesian_of, rejected_control, rows_of_given
-from photostrip.pipeline.inputs import GivenOrientations, Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.inputs import (
+    CameraPositions,
+    GivenOrientations,
+    Inputs,
+    MeasuredModels,
+    ModelStrip,
+    Settings,
+    Strip,
+)
 from photostrip.pipeline.results import Result
 from photostrip.plausibility import flight, found, given_points, units
 from photostrip.plausibility import flight as given_angles
@@ -97,6 +105,7 @@ class OfStrip:
     slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
     mirrored: list[Finding] = field(default_factory=list)  # that it fits as its mirror image, without the cause
     confirmed: frozenset[int] = frozenset()  # control lists that it fits as they are given
+    with_positions: bool | None = None  # of a mirrored one: whether camera positions go with the control, or exchanged
 
 
 def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
@@ -111,7 +120,10 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
         return OfStrip(whole)
     better = control_readings.find_reading(held, points, control.read_in, as_given)
     mirrored: list[Finding] = []
+    with_positions: bool | None = None
     if better is not None:
+        if better.reading.mirrored:
+            with_positions = _with_positions(control, held, better.laid)
         into = mirrored if better.reading.mirrored else whole
         into.append(control_readings.named(better, as_given, held, control.frames))
     else:
@@ -120,7 +132,7 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
     laid, reading = (as_given, control_readings.AS_GIVEN) if better is None else (better.laid, better.reading)
     fits = better is None and as_given is not None and as_given.fits
     confirmed = frozenset(points.frame[held.given].tolist()) if fits else frozenset()
-    of_all = OfStrip(whole, mirrored=mirrored, confirmed=confirmed)
+    of_all = OfStrip(whole, mirrored=mirrored, confirmed=confirmed, with_positions=with_positions)
     if laid is None or not laid.fits or reading.rows or (whole and better is None):
         return of_all
     given = given_points.level(points.take(held.given), control.frames, as_written=control.as_written)
@@ -134,6 +146,33 @@ def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings
     return of_all
 
 
+def _with_positions(control: GivenControl, held: HeldStrip, mirrored: OnControl) -> bool | None:
+    """Whether camera positions lie where a mirrored strip has its photos on the control as it is given.
+
+    Returns False where they lie over the control with its plan axes exchanged, and None where nothing tells.
+    """
+    given, photos = control.inputs.positions, held.stage.strip.photos
+    if given is None or control.as_written:
+        return None
+    rows = locate(photos, given.photos)
+    shown = (rows >= 0) & given.use[rows].all(axis=1)
+    exchanged = held.read(control_readings.PLAN_EXCHANGED(control.points), control.frames)
+    try:
+        tied, _ = tie_frames([given.frame, *control.inputs.frames], control.inputs.output or given.frame)
+        positions = tied[0].cartesian_from_ground(given.enu[rows[shown]])
+    except (GeometryError, InputError):
+        return None
+    off = []  # in bases
+    for laid in (mirrored, exchanged):
+        if laid is None or not shown.any():
+            return None
+        centers = laid.oriented.intermediate.cartesian_from_intermediate(laid.centers)
+        base = np.median(np.linalg.norm(np.diff(centers, axis=0), axis=1))
+        off.append(np.median(np.linalg.norm(centers[shown] - positions, axis=1)) / base)
+    is_told = min(off) < NEAR_BY * min(max(off), 1.0)  # a flight along north-east lies where it lay
+    return bool(off[0] < off[1]) if is_told else None
+
+
 def of_strips(
     control: GivenControl, stages: Iterable[FormedPhotos | LinkedModels], settings: Settings
 ) -> tuple[list[Finding], list[Finding]]:
@@ -142,9 +181,14 @@ def of_strips(
     mirrored = [finding for each in all_strips for finding in each.mirrored if control.axes_are_right is not False]
     shown = locate([name for each in mirrored for name in each.points], control.points.ids)
     confirmed = frozenset[int]().union(*(each.confirmed for each in all_strips))
-    right = "other strips fit it as it is" if confirmed & set(control.points.frame[shown].tolist()) else ""
-    right = "it lies where its crs is" if control.axes_are_right else right
-    whole = control_readings.of_mirrored(mirrored, control.inputs, control.frames, right)
+    whole = control_readings.of_mirrored(
+        mirrored,
+        control.inputs,
+        control.frames,
+        in_place=control.axes_are_right is True,
+        others_fit=not confirmed.isdisjoint(control.points.frame[shown].tolist()),
+        with_positions=next((each.with_positions for each in all_strips if each.with_positions is not None), None),
+    )
     whole += [finding for each in all_strips for finding in each.whole]
     return whole, [finding for each in all_strips for finding in each.slips]
 
@@ -249,6 +293,7 @@ def of_result(result: Result, predicted: Predicted, control: GivenControl) -> It
     yield from given_points.find_slips(given, predicted.off * scale, predicted.spread, asked=asked)
 
 
+NEAR_BY = 0.3  # of a base, or of how far off it is elsewhere, within which a camera position is that of its photo
 LEAST_POINTS = 3  # points that carry a similarity
 LEAST_BREADTH = 0.05  # second over first extent of control, below which it says nothing of the roll
 MOST_REFITS = 4  # of leaving out what does not fit
@@ -278,6 +323,11 @@ class GivenCenters(NamedTuple):
     photos: tuple[str, ...]  # those whose centre is given in full
     enu: Floats  # (n, 3)
     sigma: Floats  # (n, 3): standard deviations, metres; NaN where none is stated
+
+    @classmethod
+    def of(cls, key: str, given: CameraPositions | GivenOrientations, whole: Numbers) -> Self:
+        photos = tuple(given.photos[row] for row in whole.tolist())
+        return cls(key=key, frame=given.frame, photos=photos, enu=given.enu[whole], sigma=given.sigma[whole])
 
 
 class LevelPlan(NamedTuple):
@@ -361,25 +411,9 @@ def over_control(
 def _given_centers(inputs: Inputs, *, starts: bool) -> Iterator[GivenCenters]:
     positions, orientations = inputs.positions, inputs.orientations
     if positions is not None:
-        whole = np.flatnonzero(positions.use.all(axis=1))
-        photos = tuple(positions.photos[row] for row in whole)
-        yield GivenCenters(
-            key="camera_positions",
-            frame=positions.frame,
-            photos=photos,
-            enu=positions.enu[whole],
-            sigma=positions.sigma[whole],
-        )
+        yield GivenCenters.of("camera_positions", positions, np.flatnonzero(positions.use.all(axis=1)))
     if orientations is not None and (orientations.observed or starts):
-        whole = np.flatnonzero(np.isfinite(orientations.enu).all(axis=1))
-        photos = tuple(orientations.photos[row] for row in whole)
-        yield GivenCenters(
-            key="orientations",
-            frame=orientations.frame,
-            photos=photos,
-            enu=orientations.enu[whole],
-            sigma=orientations.sigma[whole],
-        )
+        yield GivenCenters.of("orientations", orientations, np.flatnonzero(np.isfinite(orientations.enu).all(axis=1)))
 
 
 def _usual(sigma: Floats) -> float:
@@ -755,24 +789,19 @@ class HeldCameras(NamedTuple):
 
 def _cameras(inputs: Inputs) -> HeldCameras | None:
     """Cameras whose position is given in full and takes part in a bundle; None without any."""
-    positions, orientations = inputs.positions, inputs.orientations
-    if positions is not None:
-        photos, enu, frame = positions.photos, positions.enu, positions.frame
-        whole = np.asarray(positions.use.all(axis=1), bool)
-    elif orientations is not None and orientations.observed:
-        photos, enu, frame = orientations.photos, orientations.enu, orientations.frame
-        whole = np.asarray(np.isfinite(enu).all(axis=1), bool)
-    else:
+    given = next(_given_centers(inputs, starts=False), None)
+    if given is None or not given.photos:
         return None
+    count = len(given.photos)
     points = ControlPoints(
-        ids=photos,
-        enu=enu,
-        use=np.repeat(whole[:, None], 3, axis=1),
-        check=np.zeros(len(enu), bool),
-        sigma=np.full(enu.shape, np.nan),
-        frame=np.full(len(enu), len(inputs.frames)),
+        ids=given.photos,
+        enu=given.enu,
+        use=np.ones((count, 3), bool),
+        check=np.zeros(count, bool),
+        sigma=np.full((count, 3), np.nan),
+        frame=np.full(count, len(inputs.frames)),
     )
-    return HeldCameras(points.take(whole), frame) if whole.any() else None
+    return HeldCameras(points, given.frame)
 
 
 def _of_block(

@@ -33,11 +33,12 @@ from photostrip.network.hypotheses import (
     REVERSED,
     SHIFT,
     SHOWN_SIGMAS,
+    SIGMAS,
     Hypothesis,
 )
 from photostrip.network.observations import drift_columns
 from photostrip.network.problem import CALIBRATION
-from photostrip.network.reliability import CONTROL, Parameter
+from photostrip.network.reliability import CONTROL, POSITION, Parameter
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.evidence import OnControl
 from photostrip.pipeline.formed_models import LinkedModels
@@ -174,7 +175,7 @@ CONTINUED = "The adjustment continued with it; `processing.self_calibration` con
 
 
 def of_bundle(bundle: Bundle, inputs: Inputs, settings: Settings) -> Iterator[Finding]:
-    """Name what a group of observations shares (P105, P107, P110, P111, P112, P208, P404, P407)."""
+    """Name what a group of observations shares (P105, P107, P110, P111, P112, P208, P209, P404, P407)."""
     shared = bundle.screened.common
     yield from (_list(each, inputs) for each in shared if each.kind == LIST)
     if any(each.kind == DISTANCE for each in shared):
@@ -194,6 +195,32 @@ def of_bundle(bundle: Bundle, inputs: Inputs, settings: Settings) -> Iterator[Fi
     yield from (_order(each, bundle) for each in shared if each.kind == ORDER)
     if of_positions:
         yield from _positions(bundle, inputs, of_positions[-1])
+    yield from (_sigmas(each, bundle) for each in shared if each.kind == SIGMAS)
+
+
+def _sigmas(error: Hypothesis, bundle: Bundle) -> Finding:
+    """Name standard deviations of positions that are too small, and how far these scatter: sqrt(vv / r) by axis."""
+    problem, (group,) = bundle.screened.problem, (each for each in bundle.groups if each.kind == POSITION)
+    axes = problem.position_axes
+    factors = {f"{axes[0]} and {axes[1]}": error.factors[0], axes[2]: error.factors[1]}
+    times = " and ".join(f"about {factor:.2g} times {where}" for where, factor in factors.items() if factor > 1.0)
+    stated, scatter = {}, {}
+    for axis, name, factor in zip(range(3), axes, np.repeat(error.factors, [2, 1]).tolist(), strict=True):
+        given = np.isfinite(group.sigma[:, axis])
+        if given.any():
+            off, redundancy = group.error[given, axis], group.redundancy[given, axis]
+            stated[name] = float(np.median(group.sigma[given, axis])) / factor
+            scatter[name] = float(np.sqrt((off**2).sum() / max(redundancy.sum(), np.finfo(float).tiny)))
+    wrong, right = (", ".join(f"{each:.2g}" for each in sigma.values()) for sigma in (stated, scatter))
+    message = (
+        f"the standard deviations of the camera positions ({wrong} m) are too small, {times}: they scatter by {right} "
+        "m about where control and photos put them; the adjustment continued with standard deviations as much larger"
+    )
+    fix = f"{CAUSES[SIGMAS].cure} What they scatter by is `camera_positions.sigma: [{right}]`"
+    numbers: Evidence = {f"factor_{where.replace(' ', '_')}": factor for where, factor in factors.items()}
+    numbers |= {f"scatter_{axis}_m": each for axis, each in scatter.items()}
+    photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo))
+    return found("P209", message, fix, numbers, photos=photos, key="camera_positions.sigma")
 
 
 def _list(error: Hypothesis, inputs: Inputs) -> Finding:

@@ -25,6 +25,7 @@ from photostrip.network.hypotheses import (
     POINT,
     SCALE,
     SHIFT,
+    SIGMAS,
 )
 from photostrip.network.reliability import CONTROL, IMAGE, POSITION
 from photostrip.notes import Finding
@@ -113,6 +114,11 @@ KINDS: dict[str, Kind] = {
     "P208": Kind(
         "camera positions that share an error",
         "offset, drift, or positions of other photos",
+        WARNING,
+    ),
+    "P209": Kind(
+        "standard deviations of camera positions too small",
+        "most positions lie farther off than these allow, and nothing else explains it",
         WARNING,
     ),
     "P301": Kind("one id for two points", "its rays, or two strips, put it at two places", WARNING),
@@ -279,6 +285,13 @@ CAUSES: dict[str, Cause] = {
         told=("P208",),
         cure="put the names of the photos and their positions together anew",
         example="a test exposure counted as the first photo",
+    ),
+    SIGMAS: Cause(
+        title="standard deviations of camera positions",
+        shows="most lie farther off than stated, each its own way",
+        told=("P209",),
+        cure="were ambiguities fixed at the exposures, and is this the accuracy of positions in metres, at one sigma?",
+        example="3 cm stated for positions of a receiver without corrections",
     ),
     LIST: Cause(
         title="control list",

@@ -18,7 +18,7 @@ from photostrip.errors import PhotostripError
 from photostrip.foreign.simulated import project_files
 from photostrip.notes import LOST_SAY
 from photostrip.pipeline import gate
-from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.inputs import CameraPositions, Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.plausibility import KINDS
 from photostrip.simulation import Control, Flight, Gnss, Ground, Image, Spec, Terrain, simulate
@@ -155,9 +155,8 @@ def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: 
     by_code = {each["code"]: each for each in findings}
     assert {"P101", "P201", "P401", "P406"} <= set(by_code)
     assert set(by_code["P201"]["photos"]) == {"1003", "1004"}
-    assert by_code["P406"]["points"] == [name]
     assert (by_code["P406"]["file"], by_code["P406"]["line"]) == (str(tmp_path / "control.csv"), 6)
-    assert by_code["P101"]["key"] == "observations.unit"
+    assert (by_code["P406"]["points"], by_code["P101"]["key"]) == ([name], "observations.unit")
     assert main(["check", str(project), "--format", "json"]) == 2
     checked = {each["code"] for each in json.loads(capsys.readouterr().out)["projects"][0]["findings"]}
     assert {"P101", "P201", "P401", "P406"} <= checked
@@ -214,8 +213,7 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
     project = written(tmp_path, files, "processing: {adjustment: polynomial}\n")
     assert main(["run", str(project), "--format", "json"]) == 1
     document = json.loads(capsys.readouterr().out)
-    assert document["status"] == "failed"
-    assert document["findings"]["code"] == ["P405"]
+    assert (document["status"], document["findings"]["code"]) == ("failed", ["P405"])
     text, *_ = document["verdict"]["look_at"]
     assert text.startswith("P405 ")
     assert "heights in feet" in text
@@ -242,25 +240,32 @@ def test_each_cure_of_a_mirrored_strip_is_told_and_cures_it(
     files[name] = files[name].replace(right, wrong, 1).replace("crs: local", f"crs: {crs or frame}")
     if not cause:
         files["control.csv"] = files["control.csv"].replace("point,x,y", "point,y,x", 1)
-    run = ["run", str(written(tmp_path, files)), "--format", "json"]
+    run = ["run", str(project := written(tmp_path, files)), "--quiet"]
     assert (main(run) > 1) == bool(cause)
-    findings = json.loads(capsys.readouterr().out)["findings"]
-    if not cause:
-        assert not {"P103", "P401"} & set(findings["code"])
-        return
-    (told,) = (each for each in findings if each["severity"] == "error")
-    cures = [each.replace(": ", "=", 1) for each in re.findall("`(.*?)`", told["fix"])]
-    cures = [f"control[0].{each}" if each.startswith("axes") else each for each in cures]
+    assert capsys.readouterr().err.count("error: ") == bool(cause)
+    fixes = " ".join(each.fix for each in photostrip.check(project).findings if each.is_error)
+    cures = [each.replace(": ", "=", 1) for each in re.findall("`(.*?)`", re.sub("`axes", "`control[0].axes", fixes))]
     expected: tuple[str, ...] = ("y", "x and y") if frame else ("x and y",) if cause == "x and y" else ("y",)
-    if "local" in {frame, crs}:
-        expected = ("control", *expected) if "y" in expected else expected
-    elif cause == "control":
+    if cause == "control" and "local" not in {frame, crs}:
         expected = ("control",)
-    assert [each.partition("=")[0] for each in cures] == [HANDS[each][3].partition("=")[0] for each in expected]
-    assert cure in cures
+    elif "local" in {frame, crs} and "y" in expected:
+        expected = ("control", *expected)
+    told = [HANDS[each][3].partition("=")[0] for each in expected if cause]
+    assert ([each.partition("=")[0] for each in cures], cure in cures) == (told, bool(cause))
     for each in cures:
         assert main([*run, "--set", each, "--set", "tolerances={check_rms_xy: 0.3, check_rms_z: 1.0}"]) == 0
-        assert "P204" not in capsys.readouterr().out
+    assert "P204" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("order", "both"), [([1, 0, 2], False), ([0, 1, 2], True)], ids=["control", "photos"])
+def test_camera_positions_tell_exchanged_control_from_mirrored_photos(order: list[int], *, both: bool) -> None:
+    made, one = simulate(replace(simulation("local").spec, gnss=Gnss())), np.ones((7, 3))
+    inputs, xy = inputs_of(made), made.observations.xy * ([1, -1] if both else [1, 1])
+    positions = CameraPositions(made.truth.photo_ids, made.frames[0], np.asarray(made.gnss), one > 0, one, one[:, 0])
+    inputs = replace(inputs, observations=replace(inputs.observations, xy=xy), positions=positions)
+    (finding,) = findings_of(replace(inputs, control=replace(inputs.control, enu=inputs.control.enu[:, order])))
+    assert ("`control[0].axes: [north, east, up]` and `camera_positions.axes" in finding.fix) == both
+    assert ("observations" in finding.fix) == both
 
 
 @pytest.mark.parametrize(

@@ -29,19 +29,14 @@ if TYPE_CHECKING:
 
 
 def adjusted(
-    *,
-    strips: int = 2,
-    shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-    rows: slice | np.ndarray = slice(None),
+    *, strips: int = 2, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), rows: slice | np.ndarray = slice(None)
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
-    flight = Flight(photos=10, strips=strips)
-    simulation = simulate(Spec(seed=7, flight=flight, control=Control(bands=2), gnss=Gnss()))
+    simulation = simulate(Spec(seed=7, flight=Flight(photos=10, strips=strips), control=Control(bands=2), gnss=Gnss()))
     inputs = planted.with_gnss(np.random.default_rng(), simulation)
     assert inputs.positions is not None
     read = replace(inputs.positions, enu=inputs.positions.enu[rows] + np.asarray(shift, float))
-    inputs = replace(inputs, positions=read)
-    return simulation, triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
+    return simulation, blocks.adjusted(simulation, replace(inputs, positions=read))
 
 
 @pytest.mark.slow
@@ -65,6 +60,28 @@ def test_a_drift_of_the_positions_is_named() -> None:
     assert "`correction: drift`" in finding.message
     assert finding.evidence["drift_east_m"] == pytest.approx(4.5, abs=0.3)
     assert lost(result, "control", "position") == []
+
+
+SCATTER = np.random.default_rng(4).normal(0.0, 20.0 * np.array([0.10, 0.10, 0.15]), (20, 3))  # 20 times as stated
+TWO = np.isin(np.arange(20), [4, 15])[:, None] * 3.0 * SCATTER
+
+
+@pytest.mark.parametrize(
+    ("shift", "codes"), [(SCATTER, ["P209"]), (SCATTER + 7, ["P208", "P209"]), (TWO, []), (TWO + 7, ["P208"])]
+)
+def test_positions_that_scatter_are_told_from_wrong_ones_and_from_an_offset(
+    shift: np.ndarray, codes: list[str]
+) -> None:
+    """Lens, drift and shifted photos were accused, and 60 coordinates were rejected one by one."""
+    simulation, result = adjusted(shift=shift)
+    assert sorted({each.code for each in result.findings}) == codes
+    assert bool(lost(result, "position")) == ("P209" not in codes)
+    assert rms(simulation, result) < 0.4
+    for finding in [each for each in result.findings if each.code == "P209"]:
+        assert finding.key == "camera_positions.sigma"
+        assert (finding.evidence["factor_east_and_north"], finding.evidence["factor_up"]) == pytest.approx(
+            (20, 20), rel=0.3
+        )
 
 
 HILLS = Spec(seed=5, flight=Flight(photos=8), control=Control(bands=4), terrain=Terrain(relief=150.0))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.network.hypotheses import DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER
+from photostrip.network.hypotheses import DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER, SIGMAS
 from photostrip.network.reliability import CONTROL, IMAGE, POSITION
 from photostrip.plausibility import KINDS, flight, units
 from photostrip.plausibility.finding import CAUSES
@@ -175,7 +175,7 @@ def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
 def test_every_hypothesis_is_described_in_the_order_of_precedence() -> None:
     """Of those that explain alike the first is taken up."""
     observations = [IMAGE, CONTROL, POSITION]
-    assert list(CAUSES) == [*observations, OFFSET, DRIFT, ORDER, LIST, *OF_CAMERAS, *OF_PHOTOS]
+    assert list(CAUSES) == [*observations, OFFSET, DRIFT, ORDER, SIGMAS, LIST, *OF_CAMERAS, *OF_PHOTOS]
 
 
 def test_a_cause_is_told_by_a_finding_a_note_or_a_key_of_the_result() -> None:

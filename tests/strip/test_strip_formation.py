@@ -205,8 +205,7 @@ def test_a_broken_joint_names_its_three_photos() -> None:
         formed(replace(flown, observations=only(obs, keep)))
     error = caught.value
     assert error.exit_code == EXIT_GEOMETRY
-    assert error.code == "broken-joint"
-    assert error.photos == ("103", "104", "105")
+    assert (error.code, error.photos) == ("broken-joint", ("103", "104", "105"))
     assert "no point is common to photos 103, 104 and 105" in str(error)
     assert "at least one pass point" in str(error)
 
@@ -232,8 +231,7 @@ def test_the_steep_base_is_named() -> None:
         GeometryError, match="the base from photo 2 to 3 is parallel to the viewing direction"
     ) as caught:
         _refuse_vertical_base(upright, ("1", "2", "3"))
-    assert caught.value.code == "vertical-base"
-    assert caught.value.photos == ("2", "3")
+    assert (caught.value.code, caught.value.photos) == ("vertical-base", ("2", "3"))
 
 
 SEEDS = st.integers(0, 2**32 - 1)

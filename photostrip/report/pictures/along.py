@@ -224,6 +224,7 @@ def _over_their_sigma(
     if not np.isfinite(sizes).any():
         return []
     ids, ends, panels = np.array(names), (0.0, len(names) + 1.0), []
+    called, left_out = shortened(names) if what == "photo" else (dict(zip(names, names, strict=True)), "")
     for (part, limit), size in zip(LIMITS.items(), sizes.T, strict=True):
         at = np.column_stack([np.arange(1, len(ids) + 1), size])
         worst = np.argsort(-np.abs(np.nan_to_num(size)), kind="stable")
@@ -239,11 +240,11 @@ def _over_their_sigma(
         layers += [Marks(at[own], kind, shape, hints[own].tolist(), words, 4.0) for own, kind, shape, words in looks]
         known = [n for n in worst if np.isfinite(size[n])]
         named = known[: max(int(outside.sum()), WORST_NAMED if len(ids) > MOST_NAMED else len(ids))]
-        layers.append(Names(at[named], ids[named].tolist()))
+        layers.append(Names(at[named], [called[names[n]] for n in named]))
         panels.append(Panel(layers, part, (f"{what}s in their order", "d/σ"), x=ends, names=[""] * len(ids)))
     beyond = int((np.abs(sizes) > list(LIMITS.values())).any(axis=1).sum())
     words = f"{counted(len(ids), what)}, {beyond} outside the limits in plan or height."
-    return [chart(name, (*said, words), panels)]
+    return [chart(name, (said[0], said[1].rstrip() + left_out, words), panels)]
 
 
 # as the zones lie in the left photo, by rows: 3 and 4 on top, 1 and 2 on the base, 5 and 6 below

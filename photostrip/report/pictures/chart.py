@@ -212,12 +212,13 @@ class Areas:
         """Return where the borders run, of outlines that are not filled."""
         if "open" not in self.kind or not self.outlines:
             return np.zeros((0, 2))
-        corners = [frame.places(outline, np.tile(outline.mean(axis=0), (len(outline), 1))) for outline in self.outlines]
-        return np.concatenate([between(each, np.roll(each, 1, axis=0)) for each in corners])
+        return np.concatenate([between(each, np.roll(each, 1, axis=0)) for each in self.corners(frame)])
+
+    def corners(self, frame: Frame) -> list[Floats]:
+        return [frame.places(outline, np.tile(outline.mean(axis=0), (len(outline), 1))) for outline in self.outlines]
 
     def draw(self, frame: Frame) -> Iterator[str]:
-        about = (np.tile(outline.mean(axis=0), (len(outline), 1)) for outline in self.outlines)
-        corners = [frame.places(*each).tolist() for each in zip(self.outlines, about, strict=True)]
+        corners = [each.tolist() for each in self.corners(frame)]
         if not self.hints:
             yield svg.element("path", d="".join(f"M{svg.joined(each)}z" for each in corners), kind=self.kind)
             return

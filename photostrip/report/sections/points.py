@@ -366,13 +366,8 @@ def marks(document: Document, most: int | None = None) -> Iterator[Part]:
 
 def _by_point(marks: Sequence[Document], unit: str, decimals: int) -> Table:
     """Sum up the marks of each given point, in the order of the list."""
-    columns = (
-        *map(Field, ("point", "role")),
-        Field("marks", " 0"),
-        *fields("rms largest", f"{unit} {decimals}"),
-        Field("photo", head="on"),
-    )
-    rows = []
+    sizes = fields("rms largest", f"{unit} {decimals}")
+    columns, rows = (Field("point"), Field("role"), Field("marks", " 0"), *sizes, Field("on")), []
     for _, group in groupby(marks, itemgetter("point")):
         own = list(group)
         worst = max(own, key=itemgetter("length"))
