@@ -39,7 +39,7 @@ from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.project import cameras_of
 
 # in shares of the plan's extent: the vector or half axis in the middle, and the longest, at which others are cut off
-TYPICAL, LONGEST = 0.02, 0.12
+TYPICAL, LONGEST = 0.03, 0.12
 MANY = 100  # photos, from which their marks are small
 WORST_NAMED = 25  # points on a map of precision
 MOST_ELLIPSES = 90  # more of them are a grey cloud: new points go without
@@ -55,7 +55,10 @@ def plan_picture(plan: Plan) -> Picture:
     document = plan.document
     at, moved = plan.points[:, :2], plan.shift[:, :2]
     extent = max(_extent(plan, plan.everything), 1.0)
-    sizes = np.concatenate([np.linalg.norm(moved, axis=1), plan.ellipse[:, 0]])
+    known = np.isfinite(plan.ellipse).all(axis=1)
+    crowded = int(known.sum()) > MOST_ELLIPSES
+    shown = np.flatnonzero(known & ~(crowded & (plan.role == "new")))
+    sizes = np.concatenate([np.linalg.norm(moved, axis=1), plan.ellipse[shown, 0]])
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
     typical = max(float(np.median(sizes)), 1e-9) if len(sizes) else 1e-9
     factor, most = float(f"{TYPICAL * extent / typical:.2g}"), LONGEST * extent / min(plan.map_rows, 2)
@@ -64,12 +67,9 @@ def plan_picture(plan: Plan) -> Picture:
     axes = plan.ellipse * [factor, factor, 1.0]
     axes[:, :2] *= np.minimum(1.0, most / np.maximum(axes[:, :1], 1e-9))
     cut = factor * float(np.max(sizes, initial=0.0)) > most
-    known = np.isfinite(plan.ellipse).all(axis=1)
-    crowded = int(known.sum()) > MOST_ELLIPSES
     layers: list[Layer] = [
         Line(plan.photos[rows, :2], "photo thin dashed") for strip, rows in plan.strips.items() if strip and rows
     ]
-    shown = np.flatnonzero(known & ~(crowded & (plan.role == "new")))
     layers.append(Areas([at[n] + ellipse(*axes[n]) for n in shown], "open ellipse"))
     for role, (words, shape, size) in ROLES.items():
         rows = np.flatnonzero(plan.role == role)
