@@ -156,10 +156,7 @@ def test_the_short_way_across_the_meridian_of_180_degrees_and_feet_in_metres() -
 
 
 @pytest.mark.slow
-@given(
-    angle=st.floats(1e-7, 170.0),
-    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
-)
+@given(angle=st.floats(1e-7, 170.0), axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1))
 def test_a_rotation_is_told_by_its_angle(angle: float, axis: tuple[float, float, float]) -> None:
     now, before = documents()
     turn = Rotation.from_rotvec(np.array(axis) / math.hypot(*axis) * angle, degrees=True).as_matrix()

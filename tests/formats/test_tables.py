@@ -267,9 +267,7 @@ def test_what_is_no_number_is_explained(text: str, message: str, fix: str) -> No
 
 
 column_cells = st.one_of(
-    st.floats().map(repr),
-    st.text(max_size=6),
-    st.text(alphabet="0123456789+-.eE_, naif\u0663１", max_size=6),
+    st.floats().map(repr), st.text(max_size=6), st.text(alphabet="0123456789+-.eE_, naif\u0663１", max_size=6)
 )
 
 

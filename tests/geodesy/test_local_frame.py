@@ -45,10 +45,7 @@ def test_axes_matrix_is_a_rotation_with_the_right_axes(lat: float, lon: float, a
 
 
 @given(
-    lat=st.floats(-1.5, 1.5),
-    lon=longitude,
-    heading=st.floats(-np.pi + 1e-6, np.pi - 1e-6),
-    length=st.floats(1.0, 1e5),
+    lat=st.floats(-1.5, 1.5), lon=longitude, heading=st.floats(-np.pi + 1e-6, np.pi - 1e-6), length=st.floats(1.0, 1e5)
 )
 def test_strip_azimuth_turns_x_along_the_strip(lat: float, lon: float, heading: float, length: float) -> None:
     control = geocentric_from_geodetic([[lon, lat, 0.0], [lon, lat, 200.0]], WGS84)

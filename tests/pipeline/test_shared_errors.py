@@ -29,10 +29,7 @@ if TYPE_CHECKING:
 
 
 def adjusted(
-    *,
-    strips: int = 2,
-    shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-    rows: slice | np.ndarray = slice(None),
+    *, strips: int = 2, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), rows: slice | np.ndarray = slice(None)
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
     simulation = simulate(Spec(seed=7, flight=Flight(photos=10, strips=strips), control=Control(bands=2), gnss=Gnss()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -23,9 +22,6 @@ from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted
 from tests.results import Case, Document, case, solved, spec
 from tests.simulated import inputs_of
-
-if TYPE_CHECKING:
-    from tests.results import Document
 
 
 def strip(adjustment: str, *, wrong: float = 0.0) -> Document:
@@ -143,3 +139,19 @@ def test_redundancy_numbers_of_control_and_positions_sum_up_to_those_of_their_gr
     expected = reliability["noncentrality"] * reliability["image_sigma_um"] / np.sqrt(share[known])
     assert size[known] == pytest.approx(expected, rel=1e-3)
     assert known.sum() > 50
+
+
+@pytest.mark.slow
+def test_wrong_control_within_the_limit_by_the_sigma0_that_it_enlarges_is_named() -> None:
+    simulation = photostrip.simulate(
+        {"camera": {"preset": "film"}, "ground": {"crs": "EPSG:32633", "center_deg": [14.2, 50.3]}},
+        seed=1060,
+        flight={"photos": 20, "end_lap_percent": 62, "heading_deg": 75, "attitude_sigma_deg": [1, 1, 2]},
+        terrain={"height": 350, "relief": 90},
+        points={"extra_per_model": 6},
+        control={"every": 5, "per_band": 3, "check": 30, "sigma": [0.03, 0.03, 0.05]},
+        gross_errors=[{"kind": "image", "count": 18, "size_um": 90}, {"kind": "control", "size_m": 0.6, "axis": "z"}],
+    )
+    (note,) = simulation.project.run().document["notes"].where(code="control-doubtful")
+    assert note["points"] == [simulation.truth["errors"]["point"][-1]]
+    assert "test value 4.72, limit 4.30); it was used: by the sigma0 found the test value is 4.18" in note["message"]

@@ -196,9 +196,7 @@ def swapped(use: Mapping[str, str], flatness: float = 1.0) -> Case:
 
 @pytest.mark.parametrize("flatness", [1.0, 0.001, 5.0])
 @pytest.mark.parametrize(
-    "use",
-    [FULL, {"A": "xyz", "H": "xyz", "B": "xy", "C": "xy", "E": "z", "D": "z"}],
-    ids=["full", "mixed"],
+    "use", [FULL, {"A": "xyz", "H": "xyz", "B": "xy", "C": "xy", "E": "z", "D": "z"}], ids=["full", "mixed"]
 )
 def test_left_handed_control_is_refused_with_the_way_out(use: dict[str, str], flatness: float) -> None:
     one = swapped(use, flatness)
