@@ -35,3 +35,23 @@ class Camera:
     # b1, b2: how pixels of x depart from squares: u = (1 + b1) x + b2 y, of measured u and x, y in the image
     pixel_affinity: tuple[float, float] = (0.0, 0.0)
     distortion: Distortion | None = None
+    unit: str = (
+        "mm"  # of what the project says of it; ``"px"``: a camera in pixels, perhaps of a size that nobody knows
+    )
+
+    @property
+    def distance_key(self) -> str:
+        """Key of its principal distance in the project."""
+        return f"cameras.{self.name}.{'focal_length' if self.unit == 'px' else 'principal_distance'}"
+
+    @property
+    def size_key(self) -> str:
+        """Key of its format in the project."""
+        return f"cameras.{self.name}.{'image_size' if self.unit == 'px' else 'format'}"
+
+    def length(self, value: float, form: str = "g", in_pixels: str = "g") -> str:
+        """Write a length in the image (mm) in the unit in which the project gives the camera."""
+        return f"{self.in_unit(value):{in_pixels if self.unit == 'px' else form}} {self.unit}"
+
+    def in_unit(self, value: float) -> float:
+        return value / self.pixel_size if self.unit == "px" and self.pixel_size else value

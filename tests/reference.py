@@ -238,8 +238,7 @@ def main() -> None:
     for notebook in copy.rglob("*.ipynb"):
         text = notebook_page(json.loads(notebook.read_text(encoding="utf-8")))
         notebook.with_suffix(".md").write_text(text, encoding="utf-8")
-    folder = copy / "reference"
-    folder.mkdir(parents=True, exist_ok=True)
+    (folder := copy / "reference").mkdir(parents=True, exist_ok=True)
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "commands.md").write_text(command_page(), encoding="utf-8")
     for name, text in key_pages().items():

@@ -324,15 +324,17 @@ def _camera(given: Document) -> Camera:
         stated = {key.removeprefix("lens_"): value for key, value in given.items() if key.startswith("lens_") and value}
         columns: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in stated.items()}
         lens = Distortion(**columns)
+    unit, pixel_size = given.get("unit") or "mm", given.get("pixel_size_mm")
     b1, b2 = given.get("pixel_affinity") or (0.0, 0.0)
     return Camera(
         name=given["id"],
         principal_distance=given["principal_distance_mm"],
         principal_point=tuple(given["principal_point_mm"]),
         format=None if size is None else tuple(size),
-        pixel_size=given.get("pixel_size_mm"),
+        pixel_size=None if (unit, pixel_size) == ("px", PIXEL_SIZE) else pixel_size,  # nobody knows it
         pixel_affinity=(b1, b2),
         distortion=lens,
+        unit=unit,
     )
 
 

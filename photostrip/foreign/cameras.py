@@ -18,14 +18,17 @@ from photostrip.strip.pixel_cameras import CONVENTIONS, in_pixels
 def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return the block, for a project or, by the convention in the name of the form, for another program.
 
+    In a project a camera that was given in pixels is in pixels, whose size nobody may know.
+
     Raises InputError for pixels that are no squares, in millimetres, and for what a convention does not know.
     """
     block.require_photos("a block of cameras")
-    _, _, convention = form.partition("-")
+    _, _, asked = form.partition("-")
     cameras: Document = {}
     for name, each in block.cameras.items():
         size = {} if each.own.pixel_size is None else {"pixel_size": each.own.pixel_size}
-        if convention in CONVENTIONS:
+        own_unit = "" if each.own.unit == "mm" else "metashape" if each.own.pixel_affinity[1] else "opencv"
+        if (convention := asked or own_unit) in CONVENTIONS:
             cameras[Text(name)] = camera_in_pixels(in_pixels(each.nearest, convention, each.pixels.image_size)) | size
         else:
             require_squares(each.own, "a camera in millimetres")

@@ -79,6 +79,9 @@ def _extrinsics(block: Adjusted) -> str:
 def _intrinsics(block: Adjusted) -> str:
     camera = next(iter(block.cameras.values()))
     require_squares(camera.nearest, "HISTORIX")
+    if camera.own.unit == "px" and camera.own.pixel_size is None:
+        message = f"HISTORIX counts in millimetres, and nobody knows how large a pixel of camera {camera.own.name} is"
+        raise InputError(Fault(message, "export", fix=f"add cameras.{camera.own.name}.pixel_size to the project"))
     found = {
         "focal_length": camera.nearest.principal_distance,
         "pixel_pitch": camera.own.pixel_size if camera.own.pixel_size is not None else "",

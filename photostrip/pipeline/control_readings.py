@@ -412,7 +412,8 @@ def _of_distance(strip: Strip, factor: float, head: str, numbers: Evidence) -> F
     """Name a principal distance off by a power of ten (P105), or images that are, whose size nobody knows (P101)."""
     camera = strip.camera
     would_fit = camera.principal_distance * factor
-    message = f"{head} the principal distance is about {would_fit:.3g} mm; {camera.principal_distance:g} mm is given"
+    about, given = camera.length(would_fit, ".3g", ".0f"), camera.length(camera.principal_distance)
+    message = f"{head} the principal distance is about {about}; {given} is given"
     if camera.format is not None or 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR:
         return other_distance(camera, would_fit, message, FIX, numbers, (strip.id,))
     message += f"; or the image coordinates are {1 / factor:.4g} times as large"

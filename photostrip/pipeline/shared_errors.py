@@ -154,19 +154,20 @@ def other_distance(
     given = camera.principal_distance
     code = "P107" if abs(would_fit / given - 1.0) < LEAST_WRONG else "P105"
     evidence = numbers | {"principal_distance_mm": given, "would_fit_mm": would_fit}
-    return found(code, message, fix, evidence, strips=strips, key=f"cameras.{camera.name}.principal_distance")
+    return found(code, message, fix, evidence, strips=strips, key=camera.distance_key)
 
 
 def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
-    given, factor = strip.camera.principal_distance, 1.0 / (1.0 + stretch.share)
+    camera, factor = strip.camera, 1.0 / (1.0 + stretch.share)
+    given = camera.principal_distance
     sigma = given * stretch.sigma * factor**2
     message = (
         f"the heights of strip {strip.id} are stretched by {100 * stretch.share:+.2f} % against its control, as by a "
-        f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
-        f"{given:g} mm is given"
+        f"wrong principal distance: {camera.length(given * factor, '.2f', '.0f')} would fit (standard deviation "
+        f"{camera.length(sigma, '.2g', '.2g')}), {camera.length(given)} is given"
     )
     numbers: Evidence = {"heights_stretched": stretch.share, "standard_deviation_mm": sigma}
-    return other_distance(strip.camera, given * factor, message, FIX, numbers, (strip.id,))
+    return other_distance(camera, given * factor, message, FIX, numbers, (strip.id,))
 
 
 KEY = "camera_positions.correction"
@@ -235,20 +236,21 @@ def _is_distance(each: Parameter) -> bool:
 
 
 def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
-    strips = [each for each in inputs.strips if each.camera.name == parameter.camera]
-    camera = strips[0].camera
+    camera = _camera(parameter.camera, inputs)
     would_fit = camera.principal_distance + parameter.value
-    decimals = max(2, 1 - floor(log10(max(parameter.sigma, 1e-6))))  # two digits of the standard deviation
+    digits = 1 - floor(log10(max(camera.in_unit(parameter.sigma), 1e-6)))  # two of the standard deviation
+    form = f".{max(2, digits)}f"
     of_cameras = inputs.positions is not None or (inputs.orientations is not None and inputs.orientations.observed)
     given = ["control"] * bool(inputs.frames) + ["camera positions"] * of_cameras
     message = (
         f"the photos of camera {camera.name} agree with {' and '.join(given)} at a principal distance of "
-        f"{would_fit:.{decimals}f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm "
-        "is given. The adjustment continued with the one that fits"
+        f"{camera.length(would_fit, form, f'.{max(0, digits)}f')} (standard deviation "
+        f"{camera.length(parameter.sigma, '.2g', '.2g')}); {camera.length(camera.principal_distance)} is given. The "
+        "adjustment continued with the one that fits"
     )
     fix = f"{CAUSES[DISTANCE].cure}; if that agrees with what is given, {_decision(['principal_distance'])}"
     numbers: Evidence = {"standard_deviation_mm": parameter.sigma}
-    return other_distance(camera, would_fit, message, fix, numbers, [each.id for each in strips])
+    return other_distance(camera, would_fit, message, fix, numbers, _strips_of(camera.name, inputs))
 
 
 def _decision(names: Sequence[str]) -> str:
@@ -295,6 +297,7 @@ def _lens(
         kinds = [names[column] for column in sorted(columns)]
         name = bundle.screened.problem.camera_ids[camera]
         parameters = [each for each in bundle.parameters if each.camera == name and each.name in kinds]
+        at = f"{_camera(name, inputs).length(radius, '.0f', '.0f')} from the principal point"
         edge = [radius ** CALIBRATION[each.name].power * 1000.0 for each in parameters]
         parts = [
             f"{each.name} = {each.value:.3g} {each.unit}, {each.value * um:+.1f} µm (standard deviation "
@@ -303,7 +306,7 @@ def _lens(
         ]
         message = (
             f"photos of camera {name} agree with each other and with what is given at a lens distortion that is not "
-            f"stated; {radius:.0f} mm from the principal point, {', '.join(parts)}. {CONTINUED}"
+            f"stated; {at}, {', '.join(parts)}. {CONTINUED}"
         )
         fix = f"{CAUSES[LENS].cure}; {_decision(kinds)}"
         numbers: Evidence = {"radius_mm": radius}
@@ -311,8 +314,8 @@ def _lens(
         if curved is not None and _looks_like(parameters, curved):
             message = (
                 "The Earth's curvature, which local coordinates taken as they are leave out, or a lens distortion that "
-                f"is not stated bends what photos of camera {name} show: {radius:.0f} mm from the principal point, "
-                f"{', '.join(parts)}; the curvature would look like k1 = {curved:.3g} mm^-2. {CONTINUED}"
+                f"is not stated bends what photos of camera {name} show: {at}, {', '.join(parts)}; the curvature "
+                f"would look like k1 = {curved:.3g} mm^-2. {CONTINUED}"
             )
             fix = (
                 "are these map coordinates: name their crs, or set `processing.earth_curvature: model`; is the plane a "
@@ -343,10 +346,13 @@ def _looks_like(parameters: Sequence[Parameter], curved: float) -> bool:
 
 def _point(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     x, y = _parameters(error, bundle, "principal_point")
+    camera = _camera(x.camera, inputs)
+    unit, (off_x, off_y, sigma_x, sigma_y) = camera.unit, map(camera.in_unit, (x.value, y.value, x.sigma, y.sigma))
+    form = ".1f" if unit == "px" else ".3f"
     message = (
         f"photos of camera {x.camera} agree with each other and with what is given at a principal point that lies "
-        f"{x.value:+.3f}, {y.value:+.3f} mm from the given one (standard deviations {x.sigma:.3f}, {y.sigma:.3f} mm). "
-        f"{CONTINUED}"
+        f"{off_x:+{form}}, {off_y:+{form}} {unit} from the given one (standard deviations {sigma_x:{form}}, "
+        f"{sigma_y:{form}} {unit}). {CONTINUED}"
     )
     fix = f"{CAUSES[POINT].cure}; {_decision(['principal_point'])}"
     numbers: Evidence = {"x_mm": x.value, "y_mm": y.value, "standard_deviation_mm": max(x.sigma, y.sigma)}
@@ -376,9 +382,10 @@ def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     numbers: Evidence
     if error.kind == SHIFT:
         x, y = (each for each in own if each.name.startswith("principal_point"))
+        written, owner = ("+.2f", "+.1f"), _camera(camera, inputs)
         how = (
-            f"shifted by {x.value:+.2f} mm in x and {y.value:+.2f} mm in y (standard deviations {x.sigma:.2g} and "
-            f"{y.sigma:.2g} mm)"
+            f"shifted by {owner.length(x.value, *written)} in x and {owner.length(y.value, *written)} in y (standard "
+            f"deviations {owner.in_unit(x.sigma):.2g} and {owner.length(y.sigma, '.2g', '.2g')})"
         )
         numbers = {"shift_x_mm": x.value, "shift_y_mm": y.value}
     else:
@@ -408,6 +415,10 @@ def _photos(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Fin
     fix = "look at principal distance and principal point of the camera, and at the fiducial marks of these photos"
     of_strips = [strip.id for strip in strips]
     return found("P111", message, fix, {"photos": len(names)}, strips=of_strips, key=f"cameras.{cameras[0]}")
+
+
+def _camera(name: str, inputs: Inputs) -> Camera:
+    return next(each.camera for each in inputs.strips if each.camera.name == name)
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:

@@ -81,8 +81,8 @@ KINDS: dict[str, Kind] = {
     ),
     "P110": Kind("lens distortion that is not stated", "photos and what is given agree only with it", WARNING),
     "P111": Kind(
-        "another principal point fits better",
-        "the same, or several photos ask for shifts of their own",
+        "principal point elsewhere",
+        "the same, or several photos ask for shifts of their own; in pixels: a tenth of the format from the middle",
         WARNING,
     ),
     "P112": Kind(

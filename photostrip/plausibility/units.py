@@ -26,8 +26,9 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.crs import Area, AreasOfUse
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Finding, counted, listed
-from photostrip.plausibility.finding import WARNING, Evidence, found
+from photostrip.plausibility.finding import ERROR, WARNING, Evidence, found
 from photostrip.points import PhotoPoints
+from photostrip.strip.pixel_cameras import PIXEL_SIZE
 
 REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
 FEW_SHARE = 0.5  # of the photos of a camera, at most: they are wrong, not all
@@ -43,6 +44,10 @@ TOO_GOOD = 30.0  # times better than stated: units differ by a thousand, measure
 LEAST_MEASURED = 5e-4  # mm; what is better than half a micrometre was computed, not measured
 LEAST_CHECKED = 3  # check points that tell how good given coordinates are
 INCH = 25.4
+SAME_UNIT = 0.5  # a factor nearer to one than this is no other unit
+BEGIN_SHARE = 0.2  # of their reach: points that are counted from a corner begin nearer to it
+AT_CORNER = 0.15  # of half the format: how near the middle of the points is to where another origin would put it
+PLACE_OF_POINT = 0.1  # of the format: how far a principal point may lie from the middle of photos as they were taken
 READINGS = (
     (1e-3, "micrometres read as millimetres"),
     (1e3, "millimetres read as micrometres"),
@@ -65,7 +70,8 @@ class UnitReading(NamedTuple):
 def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> UnitReading:
     """Find the unit that brings a ratio into the likely range.
 
-    Pixels first, then the reading that brings it nearest to the middle of the range; factor 1 when none does.
+    Pixels first, then the reading that brings it nearest to the middle of the range; factor 1 when none does. Of a
+    pixel of about a micrometre, as one whose size nobody knows is taken, micrometres are no other reading.
     """
     pixels = (
         []
@@ -76,7 +82,11 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
             (1 / pixel_size, "millimetres read as pixels"),
         ]
     )
-    fits = [UnitReading(factor, name) for factor, name in pixels if likely[0] < ratio * factor < LIKELY_PIXELS]
+    fits = [
+        UnitReading(factor, name)
+        for factor, name in pixels
+        if likely[0] < ratio * factor < LIKELY_PIXELS and abs(factor - 1.0) > SAME_UNIT
+    ]
     middle = sum(likely) / 2.0
     likely_ones = [UnitReading(factor, name) for factor, name in READINGS if likely[0] < ratio * factor < likely[1]]
     fits += sorted(likely_ones, key=lambda each: abs(math.log(ratio * each.factor / middle)))
@@ -128,10 +138,11 @@ def find_wrong_units(
 ) -> tuple[list[Finding], dict[str, float]]:
     """Look for image coordinates in another unit, and for principal distances that no lens has.
 
-    Returns P101, P105.
+    Returns P101, P105, and P111 of cameras in pixels.
     Returns factor by camera that would bring its image coordinates to a likely size; 1 where nothing is wrong.
     """
-    findings, factors = [], {}
+    findings: list[Finding] = []
+    factors: dict[str, float] = {}
     by_name = {each.name: each for each in cameras.values()}
     for name, camera in by_name.items():
         known = camera.format is not None
@@ -144,6 +155,8 @@ def find_wrong_units(
         odd = [photo for photo, own in reach.of_photo.items() if not low < own < high]
         if 0 < len(odd) <= FEW_SHARE * len(reach.of_photo):
             findings.append(_odd_photos(camera, odd, reach))
+        elif (size := _reached(camera, observations, cameras)) is not None:
+            findings.append(_other_size(camera, size, list(reach.of_photo)))
         elif reach.whole > high and low < reach.about_middle < high:
             findings.append(_other_origin(camera, reach))
         else:
@@ -151,10 +164,11 @@ def find_wrong_units(
             reading = reading_of(reach.whole, likely, camera.pixel_size)
             factors[name] = reading.factor
             findings.append(_wrong_unit(camera, reach.whole, reading, list(reach.of_photo)))
+    wrong_size = {each.key for each in findings}
     for camera in by_name.values():
-        wrong = _unlikely_lens(camera)
-        if wrong is not None:
-            findings.append(wrong)
+        if camera.size_key in wrong_size:
+            continue  # nothing else can be said of it
+        findings += filter(None, (_unlikely_lens(camera), _far_point(camera)))
     return findings, factors
 
 
@@ -178,14 +192,77 @@ def _odd_photos(camera: Camera, photos: Sequence[str], reach: _Reach) -> Finding
 def _other_origin(camera: Camera, reach: _Reach) -> Finding:
     """Say that image coordinates are counted from elsewhere, not from the centre."""
     x, y = reach.middle.tolist()
+    why = "they are not counted from the centre of the photo"
+    key, fix = "observations.origin", "check `observations.origin`"
+    if camera.unit != "px":
+        fix += "; subtract the middle of the fiducial marks, or give the marks"
+    elif abs(x) < AT_CORNER and abs(y - 2.0) < AT_CORNER:
+        key, fix = "observations.y_axis", "write `y_axis: down` where rows grow downwards, else `up`"
+        why = "y is counted the other way"
+    elif abs(x - 1.0) < AT_CORNER and abs(abs(y) - 1.0) < AT_CORNER:
+        fix = "write `origin: top-left`" + ", and `y_axis: down`" * (y > 0.0)
     message = (
         f"image coordinates of camera {camera.name} reach to {reach.whole:.3g} times {_unit_of_reach(camera)}, but to "
-        f"{reach.about_middle:.2g} from their own middle, which lies at ({x:.2f}, {y:.2f}) of it: they are not counted "
-        "from the centre of the photo"
+        f"{reach.about_middle:.2g} from their own middle, which lies at ({x:.2f}, {y:.2f}) of it: {why}"
     )
-    fix = "check `observations.origin`; subtract the middle of the fiducial marks, or give the marks"
     evidence = {"reach": reach.whole, "reach_from_middle": reach.about_middle, "middle_x": x, "middle_y": y}
-    return found("P101", message, fix, evidence, photos=list(reach.of_photo), key="observations.origin")
+    return found("P101", message, fix, evidence, photos=list(reach.of_photo), key=key)
+
+
+def _reached(camera: Camera, observations: PhotoPoints, cameras: Mapping[str, Camera]) -> Floats | None:
+    """Return how far points reach that are counted from the corner of a larger photo (2,), pixels from that corner.
+
+    None for other points, and for cameras that are not given in pixels.
+    """
+    if camera.unit != "px" or camera.format is None:
+        return None
+    of_camera = [photo in cameras and cameras[photo].name == camera.name for photo in observations.photo_ids]
+    xy = observations.xy[np.array(of_camera, bool)[observations.photo]] * [1.0, -1.0] + np.array(camera.format) / 2.0
+    from_corner = np.quantile(xy, 1.0 - REACH_SHARE, axis=0), np.quantile(xy, REACH_SHARE, axis=0)
+    beyond = (from_corner[1] > camera.format).any()
+    beyond &= (from_corner[0] > 0.0).all() and (from_corner[0] < BEGIN_SHARE * from_corner[1]).all()
+    return np.array([camera.in_unit(each) for each in xy.max(axis=0)]) if beyond else None
+
+
+def _other_size(camera: Camera, reached: Floats, photos: Sequence[str]) -> Finding:
+    """Say that photos are larger than the camera, or have their sides exchanged."""
+    width, height = (camera.in_unit(each) for each in camera.format or ())
+    message = (
+        f"image coordinates of camera {camera.name} reach to column {reached[0]:.0f} and row {reached[1]:.0f}, and its "
+        f"`image_size` is [{width:g}, {height:g}]"
+    )
+    fix = "give `image_size` of the photos in which they were measured"
+    if (reached < (height, width)).all():
+        fix = f"exchange width and height: `image_size: [{height:g}, {width:g}]`"
+    evidence: Evidence = {"column": reached[0], "row": reached[1], "width_px": width, "height_px": height}
+    return found("P101", message, fix, evidence, photos=photos, key=camera.size_key)
+
+
+def _far_point(camera: Camera) -> Finding | None:
+    """Question the principal point of a camera in pixels that lies far from the middle of the photo (P111).
+
+    An error where it lies in the middle, counted from another origin; else the photo may be a part of a larger one.
+    """
+    if camera.unit != "px" or camera.format is None:
+        return None
+    off, size = np.array(camera.principal_point), np.array(camera.format)
+    if (np.abs(off) < PLACE_OF_POINT * size).all():
+        return None
+    x, y = (camera.in_unit(each) for each in off)
+    message = (
+        f"the principal point of camera {camera.name} lies {x:+.0f} px in x and {y:+.0f} px in y (up) from the middle "
+        "of the photo"
+    )
+    fix = "count it from where the `convention` does; is the photo a part of a larger one, `accept: [P111]`"
+    elsewhere = {
+        "it is counted from the corner, and the `convention` counts from the middle": [0.5, -0.5],
+        "it is counted from the middle, and the `convention` counts from the corner": [-0.5, 0.5],
+    }
+    meant = [text for text, corner in elsewhere.items() if (np.abs(off / size - corner) < PLACE_OF_POINT).all()]
+    message += "".join(f": {text}" for text in meant)
+    evidence: Evidence = {"x_px": x, "y_px": y}
+    finding = found("P111", message, fix, evidence, key=f"cameras.{camera.name}.principal_point")
+    return replace(finding, severity=ERROR) if meant else finding
 
 
 def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding]:
@@ -261,7 +338,7 @@ def _wrong_unit(camera: Camera, reach: float, reading: UnitReading, photos: Sequ
         )
         fix = "correct `observations.unit`, or the columns of the table"
         if camera.format is None:
-            message += f"; or the principal distance is not {camera.principal_distance:g} mm"
+            message += f"; or the principal distance is not {camera.length(camera.principal_distance)}"
             fix += ", or the principal distance"
     else:
         fix = "check `observations.unit`, `observations.origin` and the format of the camera"
@@ -282,13 +359,20 @@ def _unlikely_lens(camera: Camera) -> Finding | None:
     low, high = USUAL_HALF_DIAGONAL
     meant = [camera.principal_distance * factor for factor in (1e-3, 1e-2, 0.1, 10.0, INCH, 1e2, 1e3)]
     fits = sorted((each for each in meant if low < half / each < high), key=lambda each: abs(np.log(half / each)))
-    fix = f"is it {fits[0]:g} mm?" if fits else "take principal distance and format from the certificate"
+    fix = f"is it {camera.length(fits[0])}?" if fits else "take principal distance and format from the certificate"
+    if camera.unit == "px":
+        converted = camera.in_unit(camera.in_unit(camera.principal_distance))  # read as mm, in pixels of a stated size
+        least, most = (camera.length(half / each, in_pixels=".0f") for each in (high, low))
+        fix = f"`focal_length` is in pixels: mm divided by the size of a pixel in mm, here usually {least} to {most}"
+        if camera.pixel_size != PIXEL_SIZE and low < camera.in_unit(half) / converted < high:
+            fix = f"is it {converted:.0f} px? {fix}"
     message = (
-        f"camera {camera.name} with a principal distance of {camera.principal_distance:g} mm and a format of "
-        f"{camera.format[0]:g} x {camera.format[1]:g} mm would have a field of {field:.1f} degrees"
+        f"camera {camera.name} with a principal distance of {camera.length(camera.principal_distance)} and a format of "
+        f"{camera.in_unit(camera.format[0]):g} x {camera.length(camera.format[1])} would have a field of "
+        f"{field:.1f} degrees"
     )
     evidence = {"principal_distance_mm": camera.principal_distance, "half_diagonal_mm": half, "field_deg": field}
-    return found("P105", message, fix, evidence, key=f"cameras.{camera.name}.principal_distance")
+    return found("P105", message, fix, evidence, key=camera.distance_key)
 
 
 FOOT = 0.3048  # metres

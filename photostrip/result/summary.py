@@ -94,6 +94,7 @@ def angles_of(result: Result) -> Document:
 def cameras_of(result: Result) -> Table:
     """Return the table ``cameras``, in the order of the strips."""
     cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
+    in_pixels = any(camera.unit == "px" for camera in cameras.values())
     rows = [
         {
             "id": name,
@@ -103,6 +104,7 @@ def cameras_of(result: Result) -> Table:
             "fiducials": len(camera.fiducials),
             "distortion": camera.distortion and f"{camera.distortion.model}, {camera.distortion.direction}",
             **_image_of(result, camera),
+            **({"unit": camera.unit} if in_pixels else {}),
         }
         for name, camera in cameras.items()
     ]

@@ -132,9 +132,11 @@ def distortion_faults(camera: Camera, farthest: float = 0.0) -> list[Fault]:
     radius = _fold(distortion, max(farthest, _format_reach(camera)))
     if radius is None:
         return []
-    message = f"camera {camera.name}: the distortion has no inverse: the image folds {radius:.1f} mm from the "
-    message += "principal point"
+    at = camera.length(radius, ".1f", ".0f")
+    message = f"camera {camera.name}: the distortion has no inverse: the image folds {at} from the principal point"
     fix = "check signs and units of the coefficients: k1 in mm^-2, k2 in mm^-4, k3 in mm^-6, p in mm^-1, tables in mm"
+    if camera.unit == "px":
+        fix = "check signs and order of the coefficients, and the convention"
     return [Fault(message, code="distortion-folds", key=key, fix=fix)]
 
 

@@ -88,6 +88,7 @@ def in_millimetres(name: str, given: PixelCamera, pixel_size: float = PIXEL_SIZE
         pixel_size=pixel_size,
         pixel_affinity=affinity,
         distortion=distortion,
+        unit="px",
     )
 
 

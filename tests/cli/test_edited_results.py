@@ -83,8 +83,7 @@ def _edit(document: Any, random: Random) -> str:  # noqa: ANN401
 
 def faults_of(edit: Edited, right: Path, folder: Path, command: Sequence[str]) -> list[str]:
     """Run a command on an edited result; ``EDITED`` and ``RIGHT`` in it stand for the files."""
-    file = folder / "result.json"
-    file.write_text(edit.text, encoding="utf-8")
+    (file := folder / "result.json").write_text(edit.text, encoding="utf-8")
     names = {"EDITED": str(file), "RIGHT": str(right), "PAGE": str(folder / "page.html"), "OUT": str(folder / "out")}
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():

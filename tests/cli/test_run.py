@@ -164,8 +164,7 @@ def test_wrong_usage_is_told(project: Path, result: Path, arguments: list[str], 
 @pytest.mark.slow
 def test_two_runs_write_the_same_bytes_wherever_they_are(project: Path, result: Path, tmp_path: Path) -> None:
     """Other processes, another folder, another order of sets, another name of the folder of the project."""
-    moved = tmp_path / "elsewhere"
-    moved.mkdir()
+    (moved := tmp_path / "elsewhere").mkdir()
     for path in project.parent.iterdir():
         (moved / path.name).write_bytes(path.read_bytes())
     environment = {**os.environ, "PYTHONHASHSEED": "7", "PYTHONPATH": str(ROOT), "TZ": "Asia/Tokyo", "COLUMNS": "60"}

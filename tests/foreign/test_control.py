@@ -173,8 +173,7 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
     else:
         lines = [HEAD, *(pos(number, place) for number, place in enumerate(antenna))]
     (tmp_path / "events.pos").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    control = tmp_path / "gcp.json"
-    control.write_text(json.dumps(ground_control(native)), encoding="utf-8")
+    (control := tmp_path / "gcp.json").write_text(json.dumps(ground_control(native)), encoding="utf-8")
     options = ("--control", str(control), "--control-sigma", "0.01,0.01,0.015")
     source = given.write_binary(tmp_path / "model")
     assert convert(source, tmp_path / "block", "-q", *options, "--positions", str(tmp_path / "events.pos")) == 0

@@ -65,8 +65,7 @@ def control_of_opendronemap(folder: Path) -> Source:
 
 
 def events_of(lines: list[str], folder: Path) -> Source:
-    events = folder / "events.pos"
-    events.write_text("\n".join(lines), encoding="utf-8")
+    (events := folder / "events.pos").write_text("\n".join(lines), encoding="utf-8")
     return Source(small_model().write_text(folder / "model"), [events], ("--positions", str(events)))
 
 
@@ -79,8 +78,7 @@ def events_of_rtklib(folder: Path) -> Source:
 
 
 def metashape(folder: Path) -> Source:
-    source = folder / "cameras.xml"
-    source.write_text(small_cameras(), encoding="utf-8")
+    (source := folder / "cameras.xml").write_text(small_cameras(), encoding="utf-8")
     return Source(source, [source], ("--control", str(source), "--control-sigma", "1"), least=0.02)
 
 

@@ -124,8 +124,7 @@ def small(*changes: tuple[str, str]) -> str:
 
 def test_what_markers_say_of_themselves(tmp_path: Path, capsys: Capture) -> None:
     loose = '<location camera_id="1" pinned="true" x="1000" y="802"/>'
-    source = tmp_path / "cameras.XML"
-    source.write_text(small((loose, loose.replace("true", "false"))), encoding="utf-8")
+    (source := tmp_path / "cameras.XML").write_text(small((loose, loose.replace("true", "false"))), encoding="utf-8")
     assert convert(source, tmp_path / "block", "--control", str(source), "--control-sigma", "0.1,0.1,0.2") == 0
     said = capsys.readouterr().out
     assert "1 mark that Metashape placed by itself (not pinned)" in said
@@ -187,8 +186,7 @@ WRONG = {
 @pytest.mark.parametrize("kind", WRONG)
 def test_what_is_wrong_is_refused(tmp_path: Path, kind: str, capsys: Capture) -> None:
     change, words = WRONG[kind]
-    source = tmp_path / "cameras.xml"
-    source.write_text(small(change), encoding="utf-8")
+    (source := tmp_path / "cameras.xml").write_text(small(change), encoding="utf-8")
     said = refused(capsys, source, tmp_path / "block", "--control", str(source))
     assert words in said
     assert "cameras.xml" in said

@@ -134,8 +134,7 @@ def test_wrong_control_is_refused_with_its_record(tmp_path: Path, capsys: Captur
     given: dict[str, Any] = {"points": [{"id": "G", "position": place, "observations": rays}]}
     where, values, expected = CONTROL[name]
     changed(given, where, values)
-    control = tmp_path / "gcp.json"
-    control.write_text(json.dumps(given), encoding="utf-8")
+    (control := tmp_path / "gcp.json").write_text(json.dumps(given), encoding="utf-8")
     told = refused(capsys, source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1")
     assert "gcp.json: " in told
     assert expected in told

@@ -48,8 +48,7 @@ def document(folder: Path) -> dict[str, Any]:
 
 
 def edited(folder: Path, found: dict[str, Any]) -> Path:
-    path = folder / "edited.json"
-    path.write_text(to_json(in_tables(found)), encoding="utf-8")
+    (path := folder / "edited.json").write_text(to_json(in_tables(found)), encoding="utf-8")
     return path
 
 

@@ -1,12 +1,13 @@
 """Cameras of a project: distances between fiducial marks, k0 of a certificate, cameras in pixels."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import photostrip
-from photostrip.project.check import check_project
+from photostrip.cli.main import main
 from photostrip.strip.corrections import ideal_from_image
 from tests.project.samples import Sample, Y
 
@@ -83,31 +84,23 @@ TABLE = "{model: radial-table, k0: 1e-4, radius: [0, 9], distortion: [0, 0], dir
 
 
 @pytest.mark.parametrize(
-    ("texts", "place", "words"),
+    ("texts", "words"),
     [
-        (
-            with_distances(PLACES, SIDES),
-            "",
-            "fiducial_distances: 4 independent distances do not fix a figure of 4 marks",
-        ),
-        (
-            with_distances(PLACES, f"{SIDES}, [F1, F9, 1.0]"),
-            "",
-            "RC30.fiducial_distances[4]: the camera has no mark F9",
-        ),
-        (with_distances(PLACES.replace("top-left", "middle"), SIDES), "", "fiducial_places.F3: `middle` is not known"),
-        (with_distances(PLACES, SIDES.replace("211.98", "-2")), "", "fiducial_distances[0][2]: -2 is out of range"),
-        (with_distances(PLACES, SIDES.replace("211.98", "nan")), "", "fiducial_distances[0][2]"),
-        (with_distances(PLACES, "[F1, F2]"), "", "fiducial_distances[0]"),
-        (with_distances("", SIDES), "", "distances alone do not say which mark is where"),
-        (with_distances(GIVEN + PLACES, SIDES), "", "places of fiducial marks are for distances between them without"),
-        ((LENS, "{model: brown, k0: 1.5, direction: image_to_ideal}"), "project.yaml:9:", "1.5 is out of range"),
-        ((LENS, TABLE), "project.yaml:9:", "`k0` does not belong to model radial-table"),
+        (with_distances(PLACES, SIDES), "fiducial_distances: 4 independent distances do not fix a figure of 4 marks"),
+        (with_distances(PLACES, f"{SIDES}, [F1, F9, 1.0]"), "RC30.fiducial_distances[4]: the camera has no mark F9"),
+        (with_distances(PLACES.replace("top-left", "middle"), SIDES), "fiducial_places.F3: `middle` is not known"),
+        (with_distances(PLACES, SIDES.replace("211.98", "-2")), "fiducial_distances[0][2]: -2 is out of range"),
+        (with_distances(PLACES, SIDES.replace("211.98", "nan")), "fiducial_distances[0][2]"),
+        (with_distances(PLACES, "[F1, F2]"), "fiducial_distances[0]"),
+        (with_distances("", SIDES), "distances alone do not say which mark is where"),
+        (with_distances(GIVEN + PLACES, SIDES), "places of fiducial marks are for distances between them without"),
+        ((LENS, "{model: brown, k0: 1.5, direction: image_to_ideal}"), "RC30.distortion.k0: 1.5 is out of range"),
+        ((LENS, TABLE), "RC30.distortion.k0: `k0` does not belong to model radial-table"),
     ],
 )
-def test_certificates_that_are_wrong(marked: Sample, texts: tuple[str, str], place: str, words: str) -> None:
+def test_certificates_that_are_wrong(marked: Sample, texts: tuple[str, str], words: str) -> None:
     marked.change(Y, *texts)
-    marked.tells(place, words)
+    marked.tells("project.yaml:", words)
 
 
 SPEC = {
@@ -129,7 +122,7 @@ IN_PIXELS: dict[str, list[object]] = {  # principal point, distortion of the sam
 }
 
 
-def in_pixels(folder: Path, given_as: str = "", **changes: object) -> Path:
+def in_pixels(folder: Path, given_as: str = "", measured: tuple[str, str] = ("", ""), **changes: object) -> Path:
     """Write a simulated project; with a convention its camera is given in pixels."""
     simulation = photostrip.simulate(SPEC)
     simulation.write(folder)
@@ -140,7 +133,8 @@ def in_pixels(folder: Path, given_as: str = "", **changes: object) -> Path:
                 "focal_length": 8.8 / 0.0024, "principal_point": point, "distortion": lens}  # fmt: skip
         lines = [f"    {name}: {value}".replace("'", "") for name, value in {**keys, **changes}.items()]
         before, _, rest = path.read_text(encoding="utf-8").partition("    principal_distance:")
-        path.write_text("\n".join([before.rstrip(), *lines, rest[rest.index("strips:") :]]), encoding="utf-8")
+        text = "\n".join([before.rstrip(), *lines, rest[rest.index("strips:") :]])
+        path.write_text(text.replace(*measured), encoding="utf-8")
     return path
 
 
@@ -163,27 +157,50 @@ def test_the_size_of_a_pixel_changes_micrometres_only(tmp_path: Path) -> None:
     assert one == pytest.approx(other, abs=2e-4)
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"convention": "opencvv"}, "cameras.digital.convention: `opencvv` is not known"),
-        ({"focal_length": "[1, 2, 3]"}, "cameras.digital.focal_length: a list is given here"),
-        ({"focal_length": 0}, "cameras.digital.focal_length: 0 is out of range"),
-        ({"distortion": "{k4: 0.1}"}, "cameras.digital.distortion: the coefficient k4 of opencv has no counterpart"),
-        ({"distortion": "{q1: 0.1}"}, "cameras.digital.distortion: the coefficient q1 of opencv has no counterpart"),
-        ({"format": "[1, 1]"}, "cameras.digital.format: the key `format` is not known"),
-    ],
-)
-def test_faults_have_their_place(tmp_path: Path, changes: dict[str, object], told: str) -> None:
-    faults = check_project(in_pixels(tmp_path, "opencv", **changes)).faults
-    assert len(faults) == 1
-    assert told in str(faults[0])
-    assert faults[0].line
+CORNER = "it is counted from the corner, and the `convention` counts from the middle"
+WRONG = [  # what is changed, the exit codes of check and run, what is told
+    ({"image_size": "[4000, 3000]"}, 2, "image_size: P101", "`image_size` is [4000, 3000]; ", "give `image_size`"),
+    ({"image_size": "[3667, 5500]"}, 2, "image_size: P101", "width and height: `image_size: [5500, 3667]`"),
+    ({"convention": "opencvv"}, 2, "cameras.digital.convention: `opencvv` is not known"),
+    ({"focal_length": "[1, 2, 3]"}, 2, "cameras.digital.focal_length: a list is given here"),
+    ({"focal_length": 0}, 2, "cameras.digital.focal_length: 0 is out of range"),
+    ({"distortion": "{k4: 0.1}"}, 2, "cameras.digital.distortion: the coefficient k4 of opencv has no counterpart"),
+    ({"distortion": "{q1: 0.1}"}, 2, "cameras.digital.distortion: the coefficient q1 of opencv has no counterpart"),
+    ({"format": "[1, 1]"}, 2, "cameras.digital.format: the key `format` is not known"),
+    ({"measured": ("unit: px\n  y", "unit: mm\n  y")}, 2, "is given in pixels, the image coordinates are not"),
+    ({"focal_length": 8.8}, 2, "focal_length: P105", "8.8 px and a format of 5500 x 3666.67 px", "1740 px to"),
+    ({"focal_length": 8.8, "pixel_size": 0.0024}, 2, "focal_length: P105", "is it 3667 px? `focal_length` is in pixel"),
+    ({"measured": ("y_axis: down", "y_axis: up")}, 2, "y_axis: P101", "y is counted the other way", "`y_axis: down`"),
+    ({"convention": "metashape"}, 2, "principal_point: P111", "lies +2760 px in x and -1838 px in y (up)", CORNER),
+    ({"principal_point": "[2100, 1832]"}, 0, "P111", "lies -650 px in x", "`accept: [P111]`"),
+]  # fmt: skip
 
 
-def test_a_camera_in_pixels_needs_measurements_in_pixels(tmp_path: Path) -> None:
-    path = in_pixels(tmp_path, "opencv")
-    text = path.read_text(encoding="utf-8").replace("unit: px\n  y_axis", "unit: mm\n  y_axis")
-    path.write_text(text, encoding="utf-8")
-    (fault,) = [each for each in check_project(path).faults if each.code == "unit-elsewhere"]
-    assert "is given in pixels, the image coordinates are not" in fault.message
+@pytest.mark.parametrize(("changes", "code", "words"), [(changes, code, told) for changes, code, *told in WRONG])
+def test_what_is_wrong_is_told_in_pixels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, Any], code: int, words: list[str]
+) -> None:
+    path = str(in_pixels(tmp_path, "opencv", **changes))
+    for command in ("check", "run"):
+        assert main([command, path]) in {code, code and 2}
+        printed = " ".join("".join(capsys.readouterr()).split())
+        assert [word for word in words if word not in printed] == []
+        assert "multiplied by 1 " not in printed
+
+
+def test_no_size_of_a_pixel_is_invented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, result = in_pixels(tmp_path, "opencv", focal_length=3560), tmp_path / "result"
+    assert main(["run", str(path), "-o", str(result), "--verbose"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "at a principal distance of 3650.8 px (standard deviation 9.7 px); 3560 px is given" in printed
+    page = tmp_path / "report.html"
+    assert main(["report", str(result), "-o", str(page)]) == 0
+    for text in (printed, page.read_text(encoding="utf-8")):
+        assert "principal distance 3560 px, principal point 10, -5 px from the middle" in text
+        assert "format 5500 x 3666.67 px" in text
+        assert "pixels of" not in text
+    for name in ("cameras.yaml", "cameras.opencv.yaml", "cameras.metashape.yaml"):
+        assert main(["convert", str(result), str(tmp_path / name)]) == 0
+        written = (tmp_path / name).read_text(encoding="utf-8")
+        assert "image_size: [5500, 3666.66" in written
+        assert "pixel_size" not in written

@@ -76,8 +76,7 @@ models: {sigma_um: [5, 6, 7], center_sigma_um: [8, 9, 10], scale: 8000, axes: an
 
 def specification(folder: Path, text: str, *overrides: str) -> Specification:
     """Read a specification."""
-    file = folder / "spec.yaml"
-    file.write_text(text, encoding="utf-8")
+    (file := folder / "spec.yaml").write_text(text, encoding="utf-8")
     return load_specification(file, overrides)
 
 

@@ -202,6 +202,5 @@ def pseudo_parallaxes(truth: World = TRUTH, seed: int = 1, sigma: float = 0.005,
 def write(folder: Path, text: str | None = None, table: str | None = None, name: str = "coordinates.csv") -> Path:
     """Write a project with its table."""
     (folder / name).write_text(coordinates() if table is None else table, encoding="utf-8")
-    path = folder / "survey.yaml"
-    path.write_text(project() if text is None else text, encoding="utf-8")
+    (path := folder / "survey.yaml").write_text(project() if text is None else text, encoding="utf-8")
     return path

@@ -16,6 +16,7 @@ from photostrip.report.page.tables import (
     short,
 )
 
+UNKNOWN_PIXEL = 0.001  # mm: what stands in a result for a pixel whose size nobody states
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
 
 
@@ -69,13 +70,21 @@ def cameras_of(document: Document) -> dict[str, Document]:
 
 
 def camera_line(camera: Document) -> str:
-    x0, y0 = camera["principal_point_mm"]
-    text = f"principal distance {camera['principal_distance_mm']:g} mm, principal point {x0:g}, {y0:g} mm"
+    unit = camera.get("unit") or "mm"
+    size = camera["pixel_size_mm"] if unit == "px" else 1.0
+    x0, y0 = (each / size for each in camera["principal_point_mm"])
+    text = (
+        f"principal distance {camera['principal_distance_mm'] / size:g} {unit}, principal point {x0:g}, {y0:g} {unit}"
+    )
+    if unit == "px":
+        text += " from the middle, y up"
     if camera["format_mm"]:
-        text += ", format {:g} x {:g} mm".format(*camera["format_mm"])
-    if camera["pixel_size_mm"]:
+        text += ", format {:g} x {:g} {unit}".format(*(each / size for each in camera["format_mm"]), unit=unit)
+    unknown = unit == "px" and size == UNKNOWN_PIXEL
+    if camera["pixel_size_mm"] and not unknown:
         text += f", pixels of {1000 * camera['pixel_size_mm']:g} µm"
-    return f"{text}, {'distortion ' + camera['distortion'] if camera['distortion'] else 'no distortion'}"
+    text += f", distortion {camera['distortion']}" if camera["distortion"] else ", no distortion"
+    return text + "; µm in this report are pixels" * unknown
 
 
 def _corrections(corrections: Document, *, models: bool) -> Iterator[tuple[str, str]]:

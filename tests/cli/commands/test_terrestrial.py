@@ -74,8 +74,7 @@ def test_directions_and_photo_are_inverse(tmp_path: Path, said: Said) -> None:
     camera = "camera={preset: Photheo 19/1318, principal_point: [0.1, -0.2]}"
     held = (camera, "alpha=350", "omega=12", "kappa=-3", "angles=gon")
     out = said("directions", f"table={table}", *held, "--format", "csv")
-    there = tmp_path / "directions.csv"
-    there.write_text(out, encoding="utf-8")
+    (there := tmp_path / "directions.csv").write_text(out, encoding="utf-8")
     assert all(0 <= float(row["lambda"]) < 400 for row in nonempty(rows(out)))
     out = said("photo", f"table={there}", *held, "--format", "csv", "-q")
     assert [row["point"] for row in rows(out)] == ["A", "B", "C"]
@@ -477,8 +476,7 @@ def test_weak_geometry_has_exit_3(tmp_path: Path, told: Call) -> None:
     code, out, err = told("displacement", write(tmp_path, text))
     assert (code, out) == (3, "")
     assert err == "error: the left and the right station are at the same place: there is no base\n"
-    table = tmp_path / "s.csv"
-    table.write_text("point,x,z,lambda,beta\nA,1,2,3,4\n", encoding="utf-8")
+    (table := tmp_path / "s.csv").write_text("point,x,z,lambda,beta\nA,1,2,3,4\n", encoding="utf-8")
     code, _, err = told("orientation", f"table={table}", UMK)
     assert code == 3
     assert "1 point with 2 directions cannot determine alpha, omega, kappa" in err
@@ -508,8 +506,7 @@ D,62,-30,0.0188,-0.0130,150,
 
 
 def test_displacements_from_one_station(tmp_path: Path, answer: Answer) -> None:
-    table = tmp_path / "changes.csv"
-    table.write_text(CHANGES, encoding="utf-8")
+    (table := tmp_path / "changes.csv").write_text(CHANGES, encoding="utf-8")
     arguments = ("one-station", UMK, "stable=[A, B, C, D]", "sigma_um=3")
     found = answer(*arguments, f"table={table}")
     point = {each["point"]: each for each in found["points"]}
