@@ -42,6 +42,7 @@ OF_HANDS = ("P103", "P401")  # findings on axes, under which photos may come to 
 BELOW = "P204"
 ALIKE = "P410"  # coordinates that are those of others
 OUTSIDE = "P402"  # control lies outside its coordinate reference system: what a map stretches there no camera did
+OF_HEIGHTS = (BELOW, "P205")  # findings on heights of camera positions above the control
 PAIR = 2  # photos
 OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
 OF_CAMERAS = ("P105", "P107", "P110", "P111", "P112")  # findings on cameras: control that is misread looks like it
@@ -202,6 +203,8 @@ def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tu
     told = (each for each in findings if found.isdisjoint(each.strips) or each.code not in OF_STRIPS)
     told = (each for each in told if each.code not in silent)
     told = (each for each in told if each.code != BELOW or each.key or turned.isdisjoint(each.strips))
+    if any(each.is_error and each.key.startswith("control") for each in findings):  # heights above it say nothing
+        told = (each for each in told if each.code not in OF_HEIGHTS or not each.key.startswith(CAMERAS))
     if not settings.together:  # what is given of cameras takes no part
         told = (replace(each, severity="warning") if each.key.startswith(CAMERAS) else each for each in told)
     return accepted(told, settings.accept)

@@ -517,7 +517,7 @@ class OverControl:
             if read is not None and read.step[HEIGHT] > 0:  # from below two points look as from above
                 most = float(np.clip(KEPT_SIGMAS * sigma / read.step[HEIGHT], *AGREES))
                 tried += [(misfit, each, read)] if (misfit := self._misfit(read)) < most else []
-        if not tried:
+        if not tried or self._control_lies_elsewhere():
             return None
         misfit, reading, there = min(tried, key=lambda each: each[0])
         key, share = self.given.key, 100.0 * misfit
@@ -532,6 +532,11 @@ class OverControl:
         if self.given.frame.crs == "local":  # whose place nobody knows
             fix += "; or is it the control that is in another unit, or order of axes?"
         return found(reading.code, message, fix, numbers, photos=self.given.photos, key=place)
+
+    def _control_lies_elsewhere(self) -> bool:
+        """Whether it is the control that lies where its coordinate reference system is not made for."""
+        frames, _ = tie_frames(self.inputs.frames, self.inputs.output, directory=self.directory)
+        return bool(GivenControl.placed(self.inputs, frames, self.directory).findings)
 
     def _readings(self) -> Iterator[tuple[Reading, FrameSpec, Floats]]:
         """Give the readings of given coordinates that mean something of centres, and the frames of the control."""

@@ -197,8 +197,8 @@ def positions_of(result: Result) -> Document:
     found, stated = result.bundle.screened, result.bundle.block.problem.positions.sigma
     given, used = np.isfinite(stated), np.isfinite(found.problem.positions.sigma)
     cofactor = np.diagonal(found.precision.position_residuals, axis1=1, axis2=2)
-    share = np.where(used, cofactor, stated**2 - cofactor) / stated**2  # of one that was left out: minus the adjusted
     with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(used, cofactor, stated**2 - cofactor) / stated**2  # left out: minus that of the adjusted
         over = found.solution.position_residuals / (stated * np.sqrt(share) * found.limit.unit)
     values = {
         "d": np.where(given, found.solution.position_residuals, np.nan),

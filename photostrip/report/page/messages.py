@@ -23,9 +23,12 @@ EMPTY: Document = {
 }  # fmt: skip
 MOST_OF_A_KIND = 5  # faults, findings, or notes, of one kind that are told to people
 FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")  # what XML 1.0 cannot hold
-# failures of laying a strip on its control, and what of the control or of mirrored images ends in them
-ON_CONTROL = {"left-handed-control", "left-handed-models", "strip-not-tied", "control-deficient"}
-OF_CONTROL = {"P103", "P401", "P402", "P403", "P405"}
+# causes in the data, and the failures in which they end: control or images misread, control of other points
+ENDS = (
+    ({"P103", "P401", "P402", "P403", "P405"}, {"left-handed-control", "left-handed-models", "strip-not-tied",
+                                                "control-deficient", "bundle-diverged"}),
+    ({"P409"}, {"control-of-other-points", "bundle-diverged"}),
+)  # fmt: skip
 NUMBER = re.compile(r"\d+")  # in the path of a key: which of a list it is
 
 
@@ -56,8 +59,8 @@ def findings_of(error: InputError | GeometryError) -> list[Document]:
     else:
         named = {"photos": list(error.photos), "points": list(error.points)}
         failures = [finding_of(Fault(str(error), error.code)) | named]
-    if any(cause["code"] in OF_CONTROL for cause in causes):
-        failures = [each for each in failures if each["code"] not in ON_CONTROL]
+    explained = [code for kinds, ends in ENDS if any(cause["code"] in kinds for cause in causes) for code in ends]
+    failures = [each for each in failures if each["code"] not in explained]
     for cause in causes:
         repeated = [each for each in failures if each["message"].startswith(cause["message"])]
         failures = [each for each in failures if each not in repeated]
