@@ -75,18 +75,29 @@ class Findings:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Ask whether a similar known name was meant, ``did you mean `...`?``; empty when nothing is similar."""
+    """Ask whether a similar known name was meant, ``did you mean `...`?``; empty when nothing is similar.
+
+    Names with other letters and another number, as photos of two flights, are not similar but for a single character.
+    """
     from difflib import get_close_matches  # takes a millisecond to load, and is needed where a name is not known
 
     names = list(known)
-    folded = {_folded(each): each for each in reversed(names)}
-    close = get_close_matches(_folded(name), list(folded), n=1, cutoff=0.65)
+    wanted, folded = _folded(name), {_folded(each): each for each in reversed(names)}
+    close = get_close_matches(wanted, [each for each in folded if _alike(wanted, each)], n=1, cutoff=0.65)
     return meant(name, folded[close[0]]) if close else ""
 
 
 def meant(name: str, other: str) -> str:
     """Ask whether another name was meant; of names that look the same, say what they differ in."""
     return f"did you mean `{other}`?{_unseen(name, other)}"
+
+
+def _alike(one: str, other: str) -> bool:
+    """Whether two names have the same number, O read as 0, or the same letters, or differ in one character."""
+    numbers, letters = ([re.sub(part, "", each) for each in (one, other)] for part in (r"\D", r"\d"))
+    read = (re.sub(r"\D", "", each.replace("o", "0")) for each in (one, other))
+    slip = len(one) == len(other) and sum(a != b for a, b in zip(one, other, strict=True)) == 1
+    return slip or not all(numbers) or letters[0] == letters[1] or len({*numbers}) == 1 or len({*read}) == 1
 
 
 def _folded(name: str) -> str:

@@ -419,7 +419,8 @@ def _photos(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Fin
 
 
 def _camera(name: str, inputs: Inputs) -> Camera:
-    return next(each.camera for each in inputs.strips if each.camera.name == name)
+    """Return a camera by its name; of a shifted photo, which no strip names, one that is given as its own is."""
+    return next((each.camera for each in inputs.strips if each.camera.name == name), inputs.strips[0].camera)
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:

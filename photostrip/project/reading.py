@@ -503,8 +503,15 @@ def _parent(root: Node, child: Node, chain: list[str], findings: Findings, files
     files.append(path)
     inner = Findings(findings.notes)
     parent = read_document(path, inner)
-    findings.absorb(inner, lambda fault: where_named(fault, child, ("extends",)))
+    findings.absorb(inner, lambda fault: where_named(_of_preset(fault), child, ("extends",)))
     return parent
+
+
+def _of_preset(fault: Fault) -> Fault:
+    """Say where the presets of the program lie, if a file is not there."""
+    if fault.code != "file-missing" or fault.fix:
+        return fault
+    return replace(fault, fix="the presets lie in `configs/` of the source tree: copy the one that you want")
 
 
 def where_named(fault: Fault, owner: Node, key: KeyPath) -> Fault:

@@ -188,8 +188,10 @@ def test_long_lists_of_faults_are_cut_and_counted(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "known", "meant"),
-    [("nmae", ["name", "unit"], "name"), ("RC-30", ["rc30"], "rc30"), ("zzz", ["name"], ""), ("x", [], "")],
-)
+    [("nmae", ["name", "unit"], "name"), ("RC-30", ["rc30"], "rc30"), ("zzz", ["name"], ""), ("x", [], ""),
+     ("MAX_0142.JPG", ["DJI_0012.JPG"], ""), ("MAX_0142.JPG", ["DJI_0012.JPG", "DJI_0142.JPG"], "DJI_0142.JPG"),
+     ("DJI_142.JPG", ["DJI_0142.JPG"], "DJI_0142.JPG"), ("IMG_1OO3", ["IMG_1003"], "IMG_1003")],
+)  # fmt: skip
 def test_suggestions(name: str, known: list[str], meant: str) -> None:
     assert suggestion(name, known) == (f"did you mean `{meant}`?" if meant else "")
 

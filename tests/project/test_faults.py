@@ -126,6 +126,7 @@ FILES_NAMED = [
     (Y, "observations.csv", "/dev/zero", "project.yaml:17:9:", "/dev/zero is a device or a pipe"),
     (Y, "control.csv", "a" * 300, "project.yaml:22:11:", "cannot be read"),
     (Y, "photostrip: 1", "photostrip: 1\nextends: no.yaml", "project.yaml:2:10: extends:", "no.yaml does not exist"),
+    (Y, "photostrip: 1", "photostrip: 1\nextends: ../configs/a.yaml", "project.yaml:2:10:", "no folder", "source tree"),
     (Y, "photostrip: 1", "photostrip: 1\nextends: [a, b]", "project.yaml:2:10:", "only one file"),
     (Y, "photostrip: 1", "photostrip: 1\nextends:", "project.yaml:2:9:", "no value is given"),
     (Y, "photostrip: 1", "photostrip: 1\nextends: ./project.yaml", "project.yaml:2:10:", "extends itself"),
