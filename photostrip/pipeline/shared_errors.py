@@ -384,7 +384,8 @@ def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     numbers: Evidence
     if error.kind == SHIFT:
         x, y = (each for each in own if each.name.startswith("principal_point"))
-        written, owner = ("+.2f", "+.1f"), _camera(camera, inputs)
+        # in the adjustment the photo has a camera of its own
+        written, owner = ("+.2f", "+.1f"), next(each.camera for each in inputs.strips if name in each.photos)
         how = (
             f"shifted by {owner.length(x.value, *written)} in x and {owner.length(y.value, *written)} in y (standard "
             f"deviations {owner.in_unit(x.sigma):.2g} and {owner.length(y.sigma, '.2g', '.2g')})"
