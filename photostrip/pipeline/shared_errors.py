@@ -216,7 +216,9 @@ def _sigmas(error: Hypothesis, bundle: Bundle) -> Finding:
         f"the standard deviations of the camera positions ({wrong} m) are too small, {times}: they scatter by {right} "
         "m about where control and photos put them; the adjustment continued with standard deviations as much larger"
     )
-    fix = f"{CAUSES[SIGMAS].cure} What they scatter by is `camera_positions.sigma: [{right}]`"
+    fix = CAUSES[SIGMAS].cure
+    if len(scatter) == len(axes):
+        fix += f" What they scatter by is `camera_positions.sigma: [{right}]`"
     numbers: Evidence = {f"factor_{where.replace(' ', '_')}": factor for where, factor in factors.items()}
     numbers |= {f"scatter_{axis}_m": each for axis, each in scatter.items()}
     photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo))

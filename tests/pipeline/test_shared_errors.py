@@ -79,9 +79,8 @@ def test_positions_that_scatter_are_told_from_wrong_ones_and_from_an_offset(
     assert rms(simulation, result) < 0.4
     for finding in [each for each in result.findings if each.code == "P209"]:
         assert finding.key == "camera_positions.sigma"
-        assert (finding.evidence["factor_east_and_north"], finding.evidence["factor_up"]) == pytest.approx(
-            (20, 20), rel=0.3
-        )
+        factors = [finding.evidence[key] for key in ("factor_east_and_north", "factor_up")]
+        assert factors == pytest.approx([20, 20], rel=0.3)
 
 
 HILLS = Spec(seed=5, flight=Flight(photos=8), control=Control(bands=4), terrain=Terrain(relief=150.0))
