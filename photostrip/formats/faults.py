@@ -93,11 +93,12 @@ def meant(name: str, other: str) -> str:
 
 
 def _alike(one: str, other: str) -> bool:
-    """Whether two names have the same number, O read as 0, or the same letters, or differ in one character."""
+    """Whether names have the same number, O read as 0, or letters, differ in a character, or are part of each other."""
     numbers, letters = ([re.sub(part, "", each) for each in (one, other)] for part in (r"\D", r"\d"))
-    read = (re.sub(r"\D", "", each.replace("o", "0")) for each in (one, other))
+    read = [re.sub(r"\D", "", each.replace("o", "0")) for each in (one, other)]
     slip = len(one) == len(other) and sum(a != b for a, b in zip(one, other, strict=True)) == 1
-    return slip or not all(numbers) or letters[0] == letters[1] or len({*numbers}) == 1 or len({*read}) == 1
+    alike = any(first == second for first, second in (numbers, letters, read))
+    return alike or slip or not all(numbers) or one in other or other in one
 
 
 def _folded(name: str) -> str:
