@@ -25,7 +25,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted, listed
 from photostrip.pipeline import gate
 from photostrip.pipeline.frames import orient_interior
-from photostrip.pipeline.given_on_ground import over_control
+from photostrip.pipeline.given_cameras import over_control
 from photostrip.pipeline.inputs import (
     BUNDLE,
     Inputs,
