@@ -1,5 +1,6 @@
 """Cameras of a project: distances between fiducial marks, k0 of a certificate, cameras in pixels."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -190,8 +191,11 @@ def test_what_is_wrong_is_told_in_pixels(
 
 def test_no_size_of_a_pixel_is_invented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, result = in_pixels(tmp_path, "opencv", focal_length=3560), tmp_path / "result"
+    assert main(["check", str(path)]) == 0
+    assert " 0.5 px; " in capsys.readouterr().out
     assert main(["run", str(path), "-o", str(result), "--verbose"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
+    assert re.findall(r"[0-9] mm|mm\^", printed) == []
     assert "at a principal distance of 3650.8 px (standard deviation 9.7 px); 3560 px is given" in printed
     page = tmp_path / "report.html"
     assert main(["report", str(result), "-o", str(page)]) == 0
@@ -202,5 +206,6 @@ def test_no_size_of_a_pixel_is_invented(tmp_path: Path, capsys: pytest.CaptureFi
     for name in ("cameras.yaml", "cameras.opencv.yaml", "cameras.metashape.yaml"):
         assert main(["convert", str(result), str(tmp_path / name)]) == 0
         written = (tmp_path / name).read_text(encoding="utf-8")
+        assert "px by the calibration" in written
         assert "image_size: [5500, 3666.66" in written
         assert "pixel_size" not in written
