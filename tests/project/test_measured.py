@@ -135,7 +135,7 @@ def test_points_measured_again_are_averaged_and_their_spread_told(project: Sampl
     note = next(note for note in loaded.hints if note.code == "measurements-averaged")
     assert "1 point measured up to 3 times" in note.message
     assert "scatters by 0.004 in x and 0.002 in y" in note.message
-    assert "worst is point P1 on photo 1001, 0.004 off its mean" in note.message
+    assert "worst is point P1 on photo 1001, 0.004 beside the mean of its measurements" in note.message
 
 
 def test_the_mean_is_weighted(project: Sample) -> None:

@@ -159,7 +159,8 @@ def test_the_ladder(points: int, stations: int, asked: tuple[str, ...], exact: t
 
 def test_every_term_can_be_dropped_and_stands_on_the_page() -> None:
     assert {*LADDER[0][0]} == {"1", *DROP_ORDER} == {*POWERS}
-    assert f"${', '.join(POWERS)}$" in (ROOT / "docs/method.md").read_text(encoding="utf-8")
+    terms = " + ".join(f"A_{n} {power}".removesuffix(" 1") for n, power in enumerate(POWERS))
+    assert f" + {terms}$" in (ROOT / "docs/method.md").read_text(encoding="utf-8")
 
 
 def noisy(seed: int, deformation: Floats, xyz: Floats, sigma: float = 0.05) -> FitProblem:
