@@ -170,9 +170,10 @@ WRONG = [  # what is changed, the exit codes of check and run, what is told
     ({"format": "[1, 1]"}, 2, "cameras.digital.format: the key `format` is not known"),
     ({"measured": ("unit: px\n  y", "unit: mm\n  y")}, 2, "is given in pixels, the image coordinates are not"),
     ({"focal_length": 8.8}, 2, "focal_length: P105", "8.8 px and a format of 5500 x 3666.67 px", "1740 px to"),
-    ({"focal_length": 8.8, "pixel_size": 0.0024}, 2, "focal_length: P105", "is it 3667 px? `focal_length` is in pixel"),
+    ({"focal_length": 8.8, "pixel_size": 0.0024}, 2, "focal_length: P105", "is it 3667 px? `focal_length` is in"),
     ({"measured": ("y_axis: down", "y_axis: up")}, 2, "y_axis: P101", "y is counted the other way", "`y_axis: down`"),
     ({"convention": "metashape"}, 2, "principal_point: P111", "lies +2760 px in x and -1838 px in y (up)", CORNER),
+    ({"principal_point": "[27500, 18330]"}, 2, "P111", "+24750 px in x and -16497 px in y", "count it from where the"),
     ({"principal_point": "[2100, 1832]"}, 0, "P111", "lies -650 px in x", "`accept: [P111]`"),
 ]  # fmt: skip
 
