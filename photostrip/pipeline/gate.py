@@ -38,6 +38,7 @@ OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
+OF_IMAGES = ("P101", "P105", "P111")  # errors of images that put camera positions beside the control, too
 OF_HANDS = ("P103", "P401")  # findings on axes, under which photos may come to lie below the ground
 BELOW = "P204"
 ALIKE = "P410"  # coordinates that are those of others
@@ -124,7 +125,8 @@ def _of_data(
     for each in whole:
         findings += [*_of_formed(each, points), *_shared_ids(each, points)]
         findings += () if each.strip.id in moved else _of_flight(each)
-    findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=starts)
+    if not any(each.is_error and each.code in OF_IMAGES for each in accepted(images.findings, settings.accept)):
+        findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=starts)
     findings += given_cameras.angles(inputs, whole, points, directory)
     for strip in [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]:
         findings += flight.find_other_scale(images.observations, strip.id, strip.photos)

@@ -299,11 +299,13 @@ def _lens(
         kinds = [names[column] for column in sorted(columns)]
         name = bundle.screened.problem.camera_ids[camera]
         parameters = [each for each in bundle.parameters if each.camera == name and each.name in kinds]
-        at = f"{_camera(name, inputs).length(radius, '.0f', '.0f')} from the principal point"
+        owner = _camera(name, inputs)
+        at = f"{owner.length(radius, '.0f', '.0f')} from the principal point"
+        unit, size = ("px", owner.in_unit(0.001)) if owner.unit == "px" else ("µm", 1.0)
         edge = [radius ** CALIBRATION[each.name].power * 1000.0 for each in parameters]
         parts = [
-            f"{each.name} = {each.value:.3g} {each.unit}, {each.value * um:+.1f} µm (standard deviation "
-            f"{each.sigma * um:.1f} µm)"
+            f"{each.name} = {each.of(owner).value:.3g} {each.of(owner).unit}, {each.value * um * size:+.1f} {unit} "
+            f"(standard deviation {each.sigma * um * size:.1f} {unit})"
             for each, um in zip(parameters, edge, strict=True)
         ]
         message = (
