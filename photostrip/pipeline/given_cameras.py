@@ -223,15 +223,11 @@ class OverControl:
         last: dict[int, tuple[int, Floats]] = {}
         for each in self.rays:
             for point, ray in zip(each.number.tolist(), each.measured, strict=True):
-                before = last.get(point)
-                last[point] = each.station, ray
+                before, last[point] = last.get(point), (each.station, ray)
                 if before is None or cameras[photos[before[0]]] != cameras[photos[each.station]]:
                     continue
-                names, focal = (
-                    (photos[before[0]], photos[each.station]),
-                    cameras[photos[each.station]].principal_distance,
-                )
-                oriented = evidence.oriented_pair(self.observations, names, focal)
+                focal = cameras[photos[each.station]].principal_distance
+                oriented = evidence.oriented_pair(self.observations, (photos[before[0]], photos[each.station]), focal)
                 if oriented is not None:
                     measured = -np.stack([before[1], oriented[1] @ ray])
                     yield Rays(point, np.array([before[0], each.station]), measured, from_photo=False)
