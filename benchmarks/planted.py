@@ -66,7 +66,7 @@ TOLD_LEVEL = 1e-3  # probability that noise alone lets the sum of squares grow b
 FOOT, US_FOOT = 0.3048, 1200 / 3937
 GROSS_SHARE = 0.2  # of the strips have two gross errors of image coordinates, which are none of the mistakes
 THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
-EVEN = 0.5
+EVEN, LEAST_FULL = 0.5, 8
 SHIFT = 5.0  # mm
 HARMLESS = np.radians(0.3)  # rms of given angles: start values need not be better
 BEYOND = 1 / 3  # of what the control spans, beyond which a sound strip does not reach at either end
@@ -145,16 +145,12 @@ NOBODY: frozenset[str] = frozenset()
 # ----------------------------------------------------------------------------------------------- strips and blocks
 
 
-def given_as_simulated(_: np.random.Generator, simulation: Simulation) -> Inputs:
-    return inputs_of(simulation)
-
-
 def layout(
     stream: int | tuple[int, ...],
     draw: Callable[[np.random.Generator], Spec],
     *,
     methods: tuple[str, ...] = (AUTO,),
-    given: Callable[[np.random.Generator, Simulation], Inputs] = given_as_simulated,
+    given: Callable[[np.random.Generator, Simulation], Inputs] = lambda _, simulation: inputs_of(simulation),
     fits: Callable[[Case], bool] = lambda _: True,
 ) -> Make:
     """Simulate what is drawn and make a project of it; drawn again where so few points do not suffice.
@@ -641,10 +637,10 @@ def of_all_given(change: Callable[[Case, Floats], Floats], kinds: str = "EPSG lo
     return plant
 
 
-def enough(case: Case, least: int = 6) -> bool:
-    """Whether the control has some points in full, so that one of them can be told to be wrong."""
+def enough(case: Case) -> bool:
+    """Whether the control has eight points in full, so that one of them can be told to be wrong."""
     control = case.inputs.control
-    return int((control.use.all(axis=1) & ~control.check).sum()) >= least
+    return int((control.use.all(axis=1) & ~control.check).sum()) >= LEAST_FULL
 
 
 def axes_exchanged(case: Case) -> Planted | None:
@@ -712,7 +708,7 @@ def slip_of_a_digit(case: Case, *, check: bool = False, least: float = 0.0) -> P
     least: times the noise that the slip must have.
     """
     control, rows = case.inputs.control, case.full(check=check)
-    if case.kind in {"geocentric", "geographic"} or not enough(case, 8) or not len(rows):
+    if case.kind in {"geocentric", "geographic"} or not enough(case) or not len(rows):
         return None
     row, axis = int(case.rng.choice(rows)), int(case.rng.integers(3))
     worth = 10.0 ** case.rng.integers(0, 4)
@@ -731,7 +727,7 @@ def of_one_given(change: Callable[[Case, Floats], Floats]) -> Plant:
     """Change the projected coordinates (3,) of one of eight control points."""
 
     def plant(case: Case) -> Planted | None:
-        if case.kind != "EPSG" or not enough(case, 8):
+        if case.kind != "EPSG" or not enough(case):
             return None
         row, enu = int(case.rng.choice(case.full())), case.inputs.control.enu.copy()
         enu[row] = change(case, enu[row].copy())
@@ -758,7 +754,7 @@ def of_two_given(change: Callable[[Floats, int, int], Floats], wrong: slice) -> 
 
     def plant(case: Case) -> Planted | None:
         control, rows = case.inputs.control, case.full()
-        if not enough(case, 8) or len(rows) < 8:
+        if not enough(case) or len(rows) < 8:
             return None
         one, other = (int(each) for each in case.rng.choice(rows, 2, replace=False))
         enu = change(control.enu.copy(), one, other)
@@ -791,7 +787,7 @@ def slip_beside_exchanged(case: Case) -> Planted | None:
 def ids_of_given(order: Callable[[Case, tuple[str, ...]], list[str]]) -> Plant:
     """Give the coordinates of the given points to other ids."""
     return lambda case: (
-        (with_control(case, ids=tuple(order(case, case.inputs.control.ids))), NOBODY) if enough(case, 8) else None
+        (with_control(case, ids=tuple(order(case, case.inputs.control.ids))), NOBODY) if enough(case) else None
     )
 
 

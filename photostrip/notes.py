@@ -65,6 +65,20 @@ def named(noun: str, names: Sequence[str], most: int = MOST_NAMED) -> str:
     return f"{noun}{'s' if len(names) > 1 else ''} {listed(names, most)}"
 
 
+def given_in_pixels(document: Document) -> dict[str, float]:
+    """Return the sizes (mm) that pixels have in a result, of the cameras that the project gives in pixels."""
+    return {each["id"]: each["pixel_size_mm"] for each in document["cameras"] if each.get("unit") == "px"}
+
+
+def in_pixels(parameter: Document, pixel: float) -> Document:
+    """Return a parameter of a calibration, which is in a power of millimetres, in that of pixels of a size (mm)."""
+    unit = parameter["unit"]
+    power = 0 if unit == "1" else int(unit.partition("^")[2] or 1)
+    known = {key: parameter.get(key) for key in ("given", "adjusted", "value", "sigma")}
+    scaled = {key: value / pixel**power for key, value in known.items() if value is not None}
+    return {**parameter, **scaled, "unit": unit.replace("mm", "px")}
+
+
 @dataclass(frozen=True)
 class Finding:
     """One mistake that the data seem to have; see ``plausibility``."""

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 
 from photostrip.foreign.adjusted import Adjusted, require_squares
 from photostrip.foreign.project import camera_in_pixels, in_project
-from photostrip.notes import Document
+from photostrip.notes import Document, given_in_pixels, in_pixels
 from photostrip.project.resolved import yaml_text
 from photostrip.project.sections import Text
-from photostrip.strip.pixel_cameras import CONVENTIONS, in_pixels
+from photostrip.strip.pixel_cameras import CONVENTIONS
+from photostrip.strip.pixel_cameras import in_pixels as by_convention
 
 
 def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | bytes], list[str]]:
@@ -29,7 +30,9 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
         size = {} if each.own.pixel_size is None else {"pixel_size": each.own.pixel_size}
         own_unit = "" if each.own.unit == "mm" else "metashape" if each.own.pixel_affinity[1] else "opencv"
         if (convention := asked or own_unit) in CONVENTIONS:
-            cameras[Text(name)] = camera_in_pixels(in_pixels(each.nearest, convention, each.pixels.image_size)) | size
+            cameras[Text(name)] = (
+                camera_in_pixels(by_convention(each.nearest, convention, each.pixels.image_size)) | size
+            )
         else:
             require_squares(each.own, "a camera in millimetres")
             cameras[Text(name)] = in_project(each.own)
@@ -39,6 +42,8 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
 
 def _found(document: Document) -> Iterator[str]:
     """Say what the calibration added, with its standard deviations."""
-    for each in document.get("bundle", {}).get("calibration", ()):
+    sizes = given_in_pixels(document)
+    for row in document.get("bundle", {}).get("calibration", ()):
+        each = in_pixels(row, sizes[row["camera"]]) if row["camera"] in sizes else row
         named = f"camera {each['camera']}, {each['parameter']}: {each['value']:+g} {each['unit']}"
         yield f"# {named} by the calibration, standard deviation {each['sigma']:g}; it is in these numbers\n"

@@ -318,32 +318,33 @@ def _columns_of_images(solution: BundleSolution, together: Sequence[Hypothesis])
 
 def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     """Columns of a hypothesis about what is given, in units of its standard deviations."""
-    problem = solution.prepared.problem
+    problem, c = solution.prepared.problem, solution.image_residuals.shape[1]
     control, positions = problem.control, problem.positions
-    none, c = np.zeros(len(problem.images), bool), solution.image_residuals.shape[1]
     if hypothesis.kind == LIST:
-        axes = _given_axes(problem, hypothesis.number)
-        rows = np.where(_members(control, hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
-        shifts = rows[:, :, None] * np.eye(3)[:, axes]
-        k = len(axes)
-        nothing = np.zeros((len(positions), 3, k))
-        return Columns(among=none, rays=np.zeros((0, c, k)), control=shifts, positions=nothing)
-    group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
-    groups = np.unique(group[group >= 0])
-    weight = np.where(group >= 0, 1.0, 0.0)[:, None] / positions.sigma
-    factors = [np.ones(len(positions))]
-    if hypothesis.kind == DRIFT:  # one of an offset that is asked for already is the drift alone
-        factors = [positions.time] if positions.offset_sigma.any() else [*factors, positions.time]
-    parts = [
-        (weight * (group == number)[:, None] * factor[:, None])[:, :, None] * np.eye(3)
-        for factor in factors
-        for number in groups.tolist()
-    ]
-    shifts = np.concatenate(parts, axis=2)
-    shifts = shifts[:, :, shifts.any(axis=(0, 1))]
-    k = shifts.shape[2]
-    nothing = np.zeros((len(control), 3, k))
-    return Columns(among=none, rays=np.zeros((0, c, k)), control=nothing, positions=shifts)
+        weight = np.where(_members(control, hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
+        shifts = weight[:, :, None] * np.eye(3)[:, _given_axes(problem, hypothesis.number)]
+    else:
+        group = _groups(positions, hypothesis)
+        weight = np.where(group >= 0, 1.0, 0.0)[:, None] / positions.sigma
+        factors = [np.ones(len(positions))]
+        if hypothesis.kind == DRIFT:  # one of an offset that is asked for already is the drift alone
+            factors = [positions.time] if positions.offset_sigma.any() else [*factors, positions.time]
+        parts = [
+            (weight * (group == number)[:, None] * factor[:, None])[:, :, None] * np.eye(3)
+            for factor in factors
+            for number in np.unique(group[group >= 0]).tolist()
+        ]
+        shifts = np.concatenate(parts, axis=2)
+        shifts = shifts[:, :, shifts.any(axis=(0, 1))]
+    k, of_list = shifts.shape[2], hypothesis.kind == LIST
+    nothing = np.zeros((len(positions) if of_list else len(control), 3, k))
+    on_control, on_positions = (shifts, nothing) if of_list else (nothing, shifts)
+    return Columns(np.zeros(len(problem.images), bool), np.zeros((0, c, k)), on_control, on_positions)
+
+
+def _groups(positions: PositionObservations, hypothesis: Hypothesis) -> Numbers:
+    """Return the groups (g,) of positions that share an error; -1 for those of no group."""
+    return np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
 
 
 def _given_axes(problem: BundleProblem, number: int) -> Numbers:
@@ -374,7 +375,7 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
     if hypothesis.kind in OF_CAMERAS:
         camera = np.array([hypothesis.number])
         return replace(problem, cameras=cameras.with_unknown(camera, OF_CAMERAS[hypothesis.kind]))
-    group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
+    group = _groups(positions, hypothesis)
     count = 1 if hypothesis.of == ALL else len(positions.offset_sigma)
     members = np.zeros((count, 3), np.intp)
     np.add.at(members, group[group >= 0], np.isfinite(positions.sigma[group >= 0]))

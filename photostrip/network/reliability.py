@@ -32,12 +32,14 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.errors import GeometryError
 from photostrip.network import defects
 from photostrip.network.adjustment import BundleSolution, Cofactors
 from photostrip.network.normal_equations import FactoredEquations
 from photostrip.network.observations import PRINCIPAL_DISTANCE, LinearisedOrientations, corrected, values_of, whitening
 from photostrip.network.problem import CALIBRATION, BundleProblem, BundleSettings
+from photostrip.notes import in_pixels
 from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import chi2_quantile, normal_quantile, t_p_value, t_quantile
 
@@ -599,6 +601,13 @@ class Parameter:
     @property
     def significant(self) -> bool:
         return self.p < SIGNIFICANCE
+
+    def of(self, camera: Camera | None) -> Self:
+        """Return it in the unit in which the project gives the camera."""
+        if camera is None or camera.unit != "px" or not camera.pixel_size:
+            return self
+        row = in_pixels({"unit": self.unit, "value": self.value, "sigma": self.sigma}, camera.pixel_size)
+        return replace(self, **row)
 
 
 def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | None:

@@ -10,6 +10,7 @@ Source: [Baarda 1968], [Pope 1976].
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from math import comb, log
@@ -213,7 +214,6 @@ class _Search:
         self.settings, self.rough = settings, rough
         images = problem.images
         self.by_point = np.lexsort((images.photo, images.point))
-        self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
         self.free = is_free(problem)
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
         self.held: set[tuple[str, int, int]] = set()  # given coordinates that stay
@@ -285,26 +285,24 @@ class _Search:
         """
         if self.rough or not self.waiting.any():
             return selection
-        before = self.problem
-        everything = Selection.everything(before).control
-        try:
-            without, done = (
-                self.adjust(selection),
-                self.adjust(supported(before, replace(selection, control=everything))),
-            )
-        except GeometryError:
-            self.problem = before
+        everything = Selection.everything(self.problem).control
+        with self._trial():
+            try:
+                start = supported(self.problem, replace(selection, control=everything))
+                without, done = self.adjust(selection), self.adjust(start)
+            except GeometryError:
+                return selection
+            fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / done.limit.unit**2
+            out = int(self.waiting.sum())
+            ways = comb(int(np.isfinite(self.problem.control.sigma).sum()), out)
+            doubted = min(hypotheses.log_probability(fall, out) + log(ways), 0.0)
+            likely = self._likeliest(done, doubted)
+            first = hypotheses.most_likely(likely, self.settings.level).hypothesis if likely else None
+            tried = None if first is None else self._with(first, done.selection)
+        if tried is None:
             return selection
-        fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / done.limit.unit**2
-        out = int(self.waiting.sum())
-        ways = comb(int(np.isfinite(before.control.sigma).sum()), out)
-        doubted = min(hypotheses.log_probability(fall, out) + log(ways), 0.0)
-        likely = self._likeliest(done, doubted)
-        first = hypotheses.most_likely(likely, self.settings.level).hypothesis if likely else None
-        if first is None or self._with(first, done.selection) is None:
-            self.problem = before
-            return selection
-        self.common.append(first)
+        self.problem = tried.problem
+        self.common.append(tried.hypothesis)
         self.waiting[:], self.control = False, everything
         self.began = {key: each for key, each in self.began.items() if key[0] != CONTROL}
         return supported(self.problem, done.selection)
@@ -361,14 +359,9 @@ class _Search:
         likely_ones, scaled = self._likeliest(done, self._log_p(done, worst)), self._scaled(done)
         if (likely_ones or scaled) and (reordered := self._reordered(done.selection)) is not None:
             return self.adjust(supported(self.problem, reordered))
-        before, tried = self.problem, []
-        for each in likely_ones:
-            found = self._with(each.hypothesis, done.selection)
-            if found is None:
-                self.refused.append(each.hypothesis)
-            else:
-                tried.append(_Tried(each.hypothesis, found, self.problem))
-            self.problem = before
+        adjusted = [(each.hypothesis, self._with(each.hypothesis, done.selection)) for each in likely_ones]
+        self.refused += [hypothesis for hypothesis, each in adjusted if each is None]
+        tried = [each for _, each in adjusted if each is not None]
         chosen = self._explaining_most(done, tried) if tried else None
         if scaled is not None:
             chosen = self._rather_scaled(done, scaled, tried, worst) or chosen
@@ -391,7 +384,7 @@ class _Search:
 
     def _scaled(self, done: ScreenedBundle) -> _Tried | None:
         """Multiply the standard deviations of positions until these scatter as far; None where they do so already."""
-        taken, before = np.array(hypotheses.factors_of(self.common)), self.problem
+        taken = np.array(hypotheses.factors_of(self.common))
         if not done.selection.positions.any() or any(each.kind == SIGMAS for each in self.refused):
             return None
         likely = hypotheses.of_scatter(done.scatter, done.limit.unit, taken, self._level)
@@ -399,20 +392,19 @@ class _Search:
             return None
         found, total, step = done, taken, np.array(likely.hypothesis.factors)
         asked = step != 1.0
-        try:
+        with self._trial():
             for _ in range(reliability.ITERATIONS):
                 total = total * step
                 scaling = replace(likely.hypothesis, factors=tuple(step.tolist()))
                 self.problem = hypotheses.taken_up(self.problem, scaling)
-                found = self.adjust(supported(self.problem, done.selection))
+                try:
+                    found = self.adjust(supported(self.problem, done.selection))
+                except GeometryError:
+                    return None
                 step = np.where(asked, np.maximum(found.scatter.factors / found.limit.unit, 1.0 / total), 1.0)
                 if (np.abs(step - 1.0) < SCALED).all():
                     break
             return _Tried(replace(likely.hypothesis, factors=tuple(total.tolist())), found, self.problem)
-        except GeometryError:
-            return None
-        finally:
-            self.problem = before
 
     def _rather_scaled(
         self, done: ScreenedBundle, scaled: _Tried, tried: Sequence[_Tried], worst: list[Rejection] | WrongRays
@@ -433,36 +425,42 @@ class _Search:
         of_worst = self._log_p(replace(done, limit=done.limit._replace(unit=unit)), worst)
         if log_p > min([of_worst, self._level, *(each.explained(done, unit).log_p for each in tried)]):
             return None
-        before, first = self.problem, []
-        number = len(OF_CAMERAS) + len(OF_PHOTOS) * before.photos
+        first, number = [], len(OF_CAMERAS) + len(OF_PHOTOS) * self.problem.photos
         for each in tried:
-            self.problem = each.problem
-            both = self._scaled(each.found)
+            with self._trial():
+                self.problem = each.problem
+                both = self._scaled(each.found)
             by = taken if both is None else both.hypothesis.factors
             fall = hypotheses.price(scaled.found.scatter, np.array(factors) / by)
             freedom = done.solution.redundancy - each.found.solution.redundancy
             likely = Likely.of(each.hypothesis, fall, freedom, number)
             if likely.log_p <= self._level:
                 first.append(likely)
-        self.problem = before
         if not first:
             return scaled
         name = hypotheses.most_likely(first, self.settings.level).hypothesis.name
         return next(each for each in tried if each.hypothesis.name == name)
 
-    def _with(self, hypothesis: Hypothesis, selection: Selection) -> ScreenedBundle | None:
+    @contextmanager
+    def _trial(self) -> Iterator[None]:
+        """Go on with the problem as it was before, wherever a trial ends."""
+        before = self.problem
+        try:
+            yield
+        finally:
+            self.problem = before
+
+    def _with(self, hypothesis: Hypothesis, selection: Selection) -> _Tried | None:
         """Adjust a selection with a hypothesis, from the first of its starts that leads to an end; None: none does."""
         for start in hypotheses.starts(self.problem, hypothesis):
-            before = self.problem
-            self.problem = replace(hypotheses.taken_up(before, hypothesis), start=start)
-            try:
-                found = self.adjust(supported(self.problem, selection))
-            except GeometryError:  # what is left would not hold the photos, or steps from there do not come to an end
-                self.problem = before
-                continue
-            if not hypotheses.impossible(found.solution):
-                return found
-            self.problem = before
+            with self._trial():
+                self.problem = replace(hypotheses.taken_up(self.problem, hypothesis), start=start)
+                try:
+                    found = self.adjust(supported(self.problem, selection))
+                except GeometryError:  # what is left would not hold the photos, or steps do not come to an end
+                    continue
+                if not hypotheses.impossible(found.solution):
+                    return _Tried(hypothesis, found, self.problem)
         return None
 
     def put_back(self, done: ScreenedBundle) -> Selection | None:

@@ -7,13 +7,14 @@ The bundle adjustment of a whole project: start, problem, search for gross error
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
@@ -74,16 +75,16 @@ OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle, which t
 }
 
 
-def notes(bundle: Bundle) -> tuple[Note, ...]:
+def notes(bundle: Bundle, cameras: Mapping[str, Camera]) -> tuple[Note, ...]:
     """Collect the notes on the strips that still mean something, and on the adjustment.
 
     A strip that was found among photos in no order is a start, and no pair of it the user's.
     """
     of_strips = (note for strip in bundle.start.strips if strip.strip.listed for note in strip.notes)
-    return (*(note for note in of_strips if note.code not in OF_THE_STRIP_METHOD), *_of_adjustment(bundle))
+    return (*(note for note in of_strips if note.code not in OF_THE_STRIP_METHOD), *_of_adjustment(bundle, cameras))
 
 
-def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
+def _of_adjustment(bundle: Bundle, cameras: Mapping[str, Camera]) -> Iterator[Note]:
     """Say what the surveyor should know of the adjustment."""
     solution = bundle.screened.solution
     if solution.free:
@@ -106,7 +107,8 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
     kinds, problem = list(CALIBRATION.values()), bundle.screened.problem
     places = [hypotheses.place(problem, each) for each in bundle.screened.common if hypotheses.of_images(each)]
     taken_up = {(problem.camera_ids[camera], kinds[k].title) for camera, columns in places for k in columns}
-    for parameter in bundle.parameters:
+    for each in bundle.parameters:
+        parameter = each.of(cameras.get(each.camera))
         if not parameter.significant and (parameter.camera, parameter.name) not in taken_up:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             text = (
@@ -181,7 +183,8 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
         for strip, (_, begin) in zip(start.strips, places, strict=True)
     )
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
-    return _in_one_network(bundle, calibrated, strips, points, photos, np.median(block.problem.images.sigma))
+    cameras = {strip.camera.name: strip.camera for strip in inputs.strips}
+    return _in_one_network(bundle, calibrated, strips, points, photos, np.median(block.problem.images.sigma), cameras)
 
 
 def _in_one_network(
@@ -191,6 +194,7 @@ def _in_one_network(
     points: Adjusted,
     photos: tuple[Floats, ...],
     sigma: float,
+    cameras: Mapping[str, Camera],
 ) -> AdjustedStrips:
     """Put strips, points and their precision together; sigma: stated for an image or model coordinate, mm."""
     basis, count = "a-priori" if bundle.unit == 1.0 else "a-posteriori", len(strips)
@@ -201,7 +205,7 @@ def _in_one_network(
         ties=Ties.none(),  # a point has one position
         observations=observations,
         precision=Precision(covariances, photos, sigma=(sigma * bundle.unit,) * count, basis=(basis,) * count),
-        notes=notes(bundle),
+        notes=notes(bundle, cameras),
         bundle=bundle,
     )
 
@@ -307,7 +311,7 @@ def adjusted_models(
     points = in_output(number, cartesian[number], shown[number], observations.point_ids, output)
     strips = tuple(_strip_of_models(strip, models, bundle, used, cartesian, held) for strip in bundle.start.strips)
     photos = tuple(_of_centers(strip, held, covariances) for strip in strips)
-    return _in_one_network(bundle, observations, strips, points, photos, float(np.median(measured.sigma)))
+    return _in_one_network(bundle, observations, strips, points, photos, float(np.median(measured.sigma)), {})
 
 
 def _photos_of_points(models: MeasuredModels, used: Numbers, count: int) -> Numbers:

@@ -1,6 +1,4 @@
-"""What the checks look at: strips formed for evidence, and where points lie along them.
-
-``steps`` everywhere holds, by photo, the centre of the next photo as it lies on that photo, mm.
+"""What the checks look at: strips formed for evidence.
 
 Directions of bases by relative orientation, where the photos laid side by side leave their order in doubt.
 
@@ -41,7 +39,7 @@ from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.strip_method import OrientedStrip, orient_on_control, strip_at_control
 from photostrip.plausibility import accepted, flight, units
 from photostrip.plausibility.given_points import far_away
-from photostrip.points import ControlPoints, PhotoPoints, locate, located, take_rows
+from photostrip.points import ControlPoints, PhotoPoints, take_rows
 from photostrip.strip import corrections
 from photostrip.strip.control_screening import (
     BENT,
@@ -55,9 +53,6 @@ from photostrip.strip.control_screening import (
     search,
 )
 from photostrip.strip.relative_orientation import collect_pairs, orient_unchecked, unusable_pairs
-
-BREADTH_SHARE = 0.95  # of the image points lie within the half breadth of a strip
-LEAST_RAYS = 2  # photos that must show a given point
 
 
 def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedPhotos | None:
@@ -114,83 +109,6 @@ def ideal(observations: PhotoPoints, cameras: Mapping[str, Camera], settings: Se
         return corrections.refine(observations, cameras, replace(settings.refinement, refraction=False)).observations
     except InputError:
         return observations
-
-
-def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
-    """Mean direction on the photos towards the next one, radians."""
-    known = np.array([steps.get(photo, complex("nan")) for photo in photos])
-    known = known[np.isfinite(known) & (known != 0)]
-    return float(np.angle((known / np.abs(known)).sum())) if len(known) else 0.0
-
-
-def places_along_strip(
-    strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
-) -> tuple[Numbers, Floats]:
-    """Say where along a strip given points lie.
-
-    Returns rows: (m,), rows of the given points that at least two of its photos show.
-    Returns place: (m,), where they lie along the strip in bases, from 0 at the first photo; the mean of what its photos
-        say.
-    """
-    rows, along = places_in_photos(strip, observations, steps)
-    size = len(observations.point_ids)
-    count = np.bincount(observations.point[rows], minlength=size)
-    total = np.bincount(observations.point[rows], along, size)
-    numbers = located(control.ids, observations.point_ids)
-    given = np.flatnonzero((numbers >= 0) & (count[numbers] >= LEAST_RAYS))
-    chosen = numbers[given]
-    return given, total[chosen] / count[chosen]
-
-
-def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]) -> tuple[Numbers, Floats]:
-    """Say where each photo of a strip puts its points along the strip.
-
-    Returns rows: (m,), image points of the strip.
-    Returns along: (m,), their places in bases, from 0 at the first photo.
-    """
-    position = strip.positions(observations)
-    rows = np.flatnonzero(position >= 0)
-    step = np.array([steps.get(photo, complex("nan")) for photo in strip.photos])
-    known = np.isfinite(step) & (step != 0)
-    usual = complex(np.median(step[known].real), np.median(step[known].imag)) if known.any() else 1.0
-    step = np.where(known, step, usual)[position[rows]]
-    along = (observations.xy[rows] * np.column_stack([step.real, step.imag])).sum(axis=1) / np.abs(step) ** 2
-    return rows, position[rows] + (along if known.any() else 0.0)
-
-
-def half_breadth(
-    strip: Strip,
-    observations: PhotoPoints,
-    ids: Sequence[str],
-    plan: Floats,
-    place: Floats,
-    steps: Mapping[str, complex],
-) -> float:
-    """Half the breadth of a strip, metres; 0 where two given points do not tell its scale.
-
-    The scale is that of photos that show two given points or more, or else that of the bases between given points.
-
-    ids, plan, place: given points, their plan coordinates (n, 2), metres, and their places along the strip (n,), bases.
-    """
-    inside = strip.positions(observations) >= 0
-    angle = _base_angle(strip.photos, steps)
-    across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
-    half = np.quantile(np.abs(across), BREADTH_SHARE)
-    given = locate(observations.point_ids, ids)[observations.point]
-    rows = np.flatnonzero(inside & (given >= 0))
-    rows = rows[np.argsort(observations.photo[rows], kind="stable")]
-    one, other = rows[:-1], rows[1:]
-    same = (observations.photo[one] == observations.photo[other]) & (given[one] != given[other])
-    one, other = one[same], other[same]
-    image = np.linalg.norm(observations.xy[one] - observations.xy[other], axis=1)
-    ground = np.linalg.norm(plan[given[one]] - plan[given[other]], axis=1)
-    if not (image > 0).any():
-        order = np.argsort(place, kind="stable")
-        base = np.median([abs(step) for photo in strip.photos if (step := steps.get(photo, 0.0))] or [np.nan])
-        image = np.diff(place[order]) * float(base)
-        ground = np.linalg.norm(np.diff(plan[order], axis=0), axis=1)
-    good = image > 0
-    return half * np.median(ground[good] / image[good]) if good.any() else 0.0
 
 
 LEAST_POINTS = 6  # one more than a pair has unknowns
@@ -344,9 +262,8 @@ def _put_right(observations: PhotoPoints, factor: dict[str, float], mirrored: fr
     return replace(observations, xy=observations.xy * by_photo[observations.photo])
 
 
-LEAST_DOWN = (
-    0.5  # cosine of what the mean axis of photos is off the vertical: oblique ones, too, look down upon the ground
-)
+# cosine of what the mean axis of photos is off the vertical: oblique ones, too, look down upon the ground
+LEAST_DOWN = 0.5
 MIRROR = np.array([1.0, -1.0, 1.0])  # what y of the images counted the other way does to a strip
 MOST_POINTS = 60  # control points that are looked at together: of more some are drawn, evenly along the strip
 AS_FORMED = Similarity(1.0, np.eye(3), np.zeros(3))

@@ -19,7 +19,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.network.hypotheses import DRIFT, OFFSET, ORDER
 from photostrip.network.reliability import POSITION, image_shift
 from photostrip.notes import Finding
-from photostrip.pipeline import evidence, given_on_ground, shared_errors
+from photostrip.pipeline import control_layout, evidence, given_cameras, given_on_ground, shared_errors
 from photostrip.pipeline.control_readings import find_distance
 from photostrip.pipeline.evidence import of_images, of_units
 from photostrip.pipeline.formed_models import LinkedModels
@@ -38,6 +38,7 @@ OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
+OF_IMAGES = ("P101", "P105", "P111")  # errors of images that put camera positions beside the control, too
 OF_HANDS = ("P103", "P401")  # findings on axes, under which photos may come to lie below the ground
 BELOW = "P204"
 ALIKE = "P410"  # coordinates that are those of others
@@ -63,7 +64,7 @@ def require_sound(inputs: Inputs, settings: Settings, photo: PhotoCoordinates, d
         return
     findings = [*of_units(inputs, settings, photo)]
     if settings.together:
-        given = given_on_ground.over_control(inputs, photo.observations, directory)
+        given = given_cameras.over_control(inputs, photo.observations, directory)
         findings += accepted([each.misread for each in given if each.misread is not None], settings.accept)
     for each in findings:
         if each.is_error and not each.accepted:
@@ -119,13 +120,14 @@ def _of_data(
     ]
     whole = [each for each in formed if each is not None]
     findings = [*images.findings, *_of_control(control, points, whole, settings, slips=True)]
-    findings += given_on_ground.weak_layout(inputs, settings, images, control, directory)
+    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     moved = {name for each in images.findings if each.code == OUT_OF_ORDER for name in each.strips}
     for each in whole:
         findings += [*_of_formed(each, points), *_shared_ids(each, points)]
         findings += () if each.strip.id in moved else _of_flight(each)
-    findings += given_on_ground.centers(inputs, images.observations, images.strips, directory, starts=starts)
-    findings += given_on_ground.angles(inputs, whole, points, directory)
+    if not any(each.is_error and each.code in OF_IMAGES for each in accepted(images.findings, settings.accept)):
+        findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=starts)
+    findings += given_cameras.angles(inputs, whole, points, directory)
     for strip in [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]:
         findings += flight.find_other_scale(images.observations, strip.id, strip.photos)
         if control is not None and not any(each.code in OF_DISTANCE for each in findings):
@@ -164,7 +166,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         findings += [
             each for each in given_on_ground.of_result(result, predicted, control) if named.isdisjoint(each.points)
         ]
-    findings += given_on_ground.weak_layout(inputs, settings, images, control, directory)
+    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each, strip in zip(formed, result.photo_strips, strict=True):
         findings += _of_formed(each, points)
         findings += _of_flight(each) if result.bundle is None else _of_adjusted_flight(strip)
@@ -173,7 +175,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
         findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
-    given = given_on_ground.centers(inputs, points, images.strips, directory)
+    given = given_cameras.centers(inputs, points, images.strips, directory)
     findings += [each for each in given if result.bundle is None or _contradicted(each, result.bundle)]
     findings += _of_rotations(result, formed, directory)
     if any(each.code in OF_LISTS for each in causes):  # all of the block says it best
@@ -251,7 +253,7 @@ def _of_unadjusted_models(
     """Look at strips of models of which there is no result."""
     if control is None:
         return ()
-    formed = list(given_on_ground.form_strips(models, settings))
+    formed = list(control_layout.form_strips(models, settings))
     return accepted(_of_models(formed, models, control, settings, slips=True), settings.accept)
 
 
@@ -262,7 +264,7 @@ def _of_adjusted_models(
     if control is None:
         return ()
     settings = result.settings
-    formed = list(given_on_ground.form_strips(models, settings))
+    formed = list(control_layout.form_strips(models, settings))
     findings = _of_models(formed, models, control, settings, slips=result.precision is None)
     if not any(each.is_error for each in findings):
         findings += given_on_ground.of_result(result, predicted, control)
@@ -276,9 +278,9 @@ def _of_models(
     """Look at strips of models: given points by themselves and in each strip, perspective centres."""
     whole, single = given_on_ground.of_strips(control, formed, settings)
     findings = [*control.findings, *whole, *(single if slips else ())]
-    for held in given_on_ground.model_strips(formed, models.points.point_ids, control.points):
-        findings += flight.find_odd_centers(held.centers, held.depth, given_on_ground.UP, held.photos, held.strip.id)
-        findings += given_on_ground.weak_layout_of_models(held, control)
+    for held in control_layout.model_strips(formed, models.points.point_ids, control.points):
+        findings += flight.find_odd_centers(held.centers, held.depth, given_cameras.UP, held.photos, held.strip.id)
+        findings += control_layout.weak_layout_of_models(held, control)
     return findings
 
 
@@ -302,7 +304,7 @@ def _of_adjusted_flight(strip: StripResult) -> Iterator[Finding]:
     """Look at the perspective centres of a strip as a bundle has left them."""
     centers = strip.resection.centers
     depth = np.full(len(centers), np.median(centers[:, 2]) - np.median(strip.xyz[:, 2]))  # the Earth bends both alike
-    return flight.find_odd_centers(centers, depth, given_on_ground.UP, strip.strip.photos, strip.strip.id)
+    return flight.find_odd_centers(centers, depth, given_cameras.UP, strip.strip.photos, strip.strip.id)
 
 
 def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterable[FormedPhotos]) -> Iterator[Finding]:
@@ -361,7 +363,7 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     if given is None:
         return []
     if result.bundle is not None:
-        findings = given_on_ground.angles(result.inputs, formed, result.refined.observations, directory)
+        findings = given_cameras.angles(result.inputs, formed, result.refined.observations, directory)
         if findings or given.observed:
             return findings
     target = result.inputs.output or next(iter(result.inputs.frames), given.frame)
@@ -378,4 +380,4 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     if not photos:
         return []
     of_photos, north = np.array([found[name] for name in photos]), float(np.median(np.concatenate(norths)))
-    return given_on_ground.wrong_angles(given, photos, of_photos, north)
+    return given_cameras.wrong_angles(given, photos, of_photos, north)

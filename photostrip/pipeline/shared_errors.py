@@ -6,6 +6,7 @@ What a bundle adjustment took up as common to all camera positions, or to all ph
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import floor, log10
 
 import numpy as np
@@ -299,35 +300,45 @@ def _lens(
         kinds = [names[column] for column in sorted(columns)]
         name = bundle.screened.problem.camera_ids[camera]
         parameters = [each for each in bundle.parameters if each.camera == name and each.name in kinds]
-        at = f"{_camera(name, inputs).length(radius, '.0f', '.0f')} from the principal point"
-        edge = [radius ** CALIBRATION[each.name].power * 1000.0 for each in parameters]
-        parts = [
-            f"{each.name} = {each.value:.3g} {each.unit}, {each.value * um:+.1f} µm (standard deviation "
-            f"{each.sigma * um:.1f} µm)"
-            for each, um in zip(parameters, edge, strict=True)
-        ]
-        message = (
-            f"photos of camera {name} agree with each other and with what is given at a lens distortion that is not "
-            f"stated; {at}, {', '.join(parts)}. {CONTINUED}"
-        )
-        fix = f"{CAUSES[LENS].cure}; {_decision(kinds)}"
-        numbers: Evidence = {"radius_mm": radius}
         curved = None if earth_radius is None else _of_curvature(bundle, camera, earth_radius)
+        numbers: Evidence = {"radius_mm": radius}
         if curved is not None and _looks_like(parameters, curved):
+            numbers["k1_of_curvature"] = curved
+        shown = [f"{_camera(name, inputs).length(radius, '.0f', '.0f')} from the principal point"]
+        for each in parameters:
+            um = radius ** CALIBRATION[each.name].power * 1000.0  # at that distance
+            shown.append(
+                f"{each.name} = {each.value:.3g} {each.unit}, {each.value * um:+.1f} µm (standard deviation "
+                f"{each.sigma * um:.1f} µm)"
+            )
+            numbers |= {each.name: each.value, f"{each.name}_standard_deviation": each.sigma}
+            numbers[f"{each.name}_um"] = each.value * um
+        where = f"at a lens distortion that is not stated; {', '.join(shown)}"
+        lens = _agreeing("P110", LENS, name, where, kinds, numbers, inputs)
+        if "k1_of_curvature" in numbers:
             message = (
                 "The Earth's curvature, which local coordinates taken as they are leave out, or a lens distortion that "
-                f"is not stated bends what photos of camera {name} show: {at}, {', '.join(parts)}; the curvature "
-                f"would look like k1 = {curved:.3g} mm^-2. {CONTINUED}"
+                f"is not stated bends what photos of camera {name} show: {', '.join(shown)}; the curvature would look "
+                f"like k1 = {curved:.3g} mm^-2. {CONTINUED}"
             )
             fix = (
                 "are these map coordinates: name their crs, or set `processing.earth_curvature: model`; is the plane a "
-                f"true one (`earth_curvature: none`): {fix}"
+                f"true one (`earth_curvature: none`): {lens.fix}"
             )
-            numbers["k1_of_curvature"] = curved
-        for each, um in zip(parameters, edge, strict=True):
-            numbers |= {each.name: each.value, f"{each.name}_standard_deviation": each.sigma}
-            numbers[f"{each.name}_um"] = each.value * um
-        yield found("P110", message, fix, numbers, strips=_strips_of(name, inputs), key="processing.self_calibration")
+            lens = replace(lens, message=message, fix=fix)
+        yield lens
+
+
+def _agreeing(
+    code: str, cause: str, camera: str, where: str, names: Sequence[str], numbers: Evidence, inputs: Inputs
+) -> Finding:
+    """Name what a camera has beside what is given of it.
+
+    names: of the parameters, as `processing.self_calibration` calls them.
+    """
+    message = f"photos of camera {camera} agree with each other and with what is given {where}. {CONTINUED}"
+    fix = f"{CAUSES[cause].cure}; {_decision(names)}"
+    return found(code, message, fix, numbers, strips=_strips_of(camera, inputs), key="processing.self_calibration")
 
 
 def _of_curvature(bundle: Bundle, camera: int, earth_radius: float) -> float:
@@ -351,29 +362,24 @@ def _point(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     camera = _camera(x.camera, inputs)
     unit, (off_x, off_y, sigma_x, sigma_y) = camera.unit, map(camera.in_unit, (x.value, y.value, x.sigma, y.sigma))
     form = ".1f" if unit == "px" else ".3f"
-    message = (
-        f"photos of camera {x.camera} agree with each other and with what is given at a principal point that lies "
-        f"{off_x:+{form}}, {off_y:+{form}} {unit} from the given one (standard deviations {sigma_x:{form}}, "
-        f"{sigma_y:{form}} {unit}). {CONTINUED}"
+    where = (
+        f"at a principal point that lies {off_x:+{form}}, {off_y:+{form}} {unit} from the given one (standard "
+        f"deviations {sigma_x:{form}}, {sigma_y:{form}} {unit})"
     )
-    fix = f"{CAUSES[POINT].cure}; {_decision(['principal_point'])}"
     numbers: Evidence = {"x_mm": x.value, "y_mm": y.value, "standard_deviation_mm": max(x.sigma, y.sigma)}
-    return found("P111", message, fix, numbers, strips=_strips_of(x.camera, inputs), key="processing.self_calibration")
+    return _agreeing("P111", POINT, x.camera, where, ["principal_point"], numbers, inputs)
 
 
 def _film(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     (affinity,), (shear,) = (_parameters(error, bundle, name) for name in ("affinity", "shear"))
     # b1 is what x must be stretched by: the film is shorter along x by as much
     percent, sigma, turned = -100.0 * affinity.value, 100.0 * affinity.sigma, float(np.degrees(shear.value))
-    message = (
-        f"photos of camera {affinity.camera} agree with each other and with what is given where the images are "
-        f"{abs(percent):.3f} % (standard deviation {sigma:.3f} %) {'longer' if percent > 0 else 'shorter'} along x "
-        f"than along y, its axes {abs(turned):.3f}° from a right angle. {CONTINUED}"
+    where = (
+        f"where the images are {abs(percent):.3f} % (standard deviation {sigma:.3f} %) "
+        f"{'longer' if percent > 0 else 'shorter'} along x than along y, its axes {abs(turned):.3f}° from a right angle"
     )
-    fix = f"{CAUSES[FILM].cure}; {_decision(['affinity', 'shear'])}"
     numbers: Evidence = {"x_over_y_percent": percent, "standard_deviation_percent": sigma, "shear_deg": turned}
-    strips = _strips_of(affinity.camera, inputs)
-    return found("P112", message, fix, numbers, strips=strips, key="processing.self_calibration")
+    return _agreeing("P112", FILM, affinity.camera, where, ["affinity", "shear"], numbers, inputs)
 
 
 def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:

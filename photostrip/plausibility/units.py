@@ -45,6 +45,7 @@ LEAST_MEASURED = 5e-4  # mm; what is better than half a micrometre was computed,
 LEAST_CHECKED = 3  # check points that tell how good given coordinates are
 INCH = 25.4
 SAME_UNIT = 0.5  # a factor nearer to one than this is no other unit
+MOST_SIZES = 10.0  # of a photo, that one which was taken for it is larger at most
 BEGIN_SHARE = 0.2  # of their reach: points that are counted from a corner begin nearer to it
 AT_CORNER = 0.15  # of half the format: how near the middle of the points is to where another origin would put it
 PLACE_OF_POINT = 0.1  # of the format: how far a principal point may lie from the middle of photos as they were taken
@@ -149,9 +150,13 @@ def find_wrong_units(
         low, high = REACH if known else REACH_OF_DISTANCE
         factors[name] = 1.0
         scaled, photo = _scaled(observations, cameras, camera)
-        if not len(scaled) or low < np.quantile(np.abs(scaled).max(axis=1), REACH_SHARE) < high:
+        if not len(scaled):
             continue
         reach = _reach(observations, scaled, photo)
+        if low < reach.whole < high:
+            if camera.unit == "px" and reach.about_middle < low:  # at a corner: millimetres, perhaps
+                findings.append(_wrong_unit(camera, reach.about_middle, UnitReading(1.0, ""), list(reach.of_photo)))
+            continue
         odd = [photo for photo, own in reach.of_photo.items() if not low < own < high]
         if 0 < len(odd) <= FEW_SHARE * len(reach.of_photo):
             findings.append(_odd_photos(camera, odd, reach))
@@ -220,6 +225,7 @@ def _reached(camera: Camera, observations: PhotoPoints, cameras: Mapping[str, Ca
     xy = observations.xy[np.array(of_camera, bool)[observations.photo]] * [1.0, -1.0] + np.array(camera.format) / 2.0
     from_corner = np.quantile(xy, 1.0 - REACH_SHARE, axis=0), np.quantile(xy, REACH_SHARE, axis=0)
     beyond = (from_corner[1] > camera.format).any()
+    beyond &= (from_corner[1] < MOST_SIZES * np.array(camera.format)).all()  # farther away it is another unit
     beyond &= (from_corner[0] > 0.0).all() and (from_corner[0] < BEGIN_SHARE * from_corner[1]).all()
     return np.array([camera.in_unit(each) for each in xy.max(axis=0)]) if beyond else None
 
@@ -241,7 +247,8 @@ def _other_size(camera: Camera, reached: Floats, photos: Sequence[str]) -> Findi
 def _far_point(camera: Camera) -> Finding | None:
     """Question the principal point of a camera in pixels that lies far from the middle of the photo (P111).
 
-    An error where it lies in the middle, counted from another origin; else the photo may be a part of a larger one.
+    An error where it lies in the middle, counted from another origin, or outside a photo of twice the size; else the
+    photo may be a part of a larger one.
     """
     if camera.unit != "px" or camera.format is None:
         return None
@@ -253,7 +260,7 @@ def _far_point(camera: Camera) -> Finding | None:
         f"the principal point of camera {camera.name} lies {x:+.0f} px in x and {y:+.0f} px in y (up) from the middle "
         "of the photo"
     )
-    fix = "count it from where the `convention` does; is the photo a part of a larger one, `accept: [P111]`"
+    fix = "count it from where the `convention` does"
     elsewhere = {
         "it is counted from the corner, and the `convention` counts from the middle": [0.5, -0.5],
         "it is counted from the middle, and the `convention` counts from the corner": [-0.5, 0.5],
@@ -262,7 +269,9 @@ def _far_point(camera: Camera) -> Finding | None:
     message += "".join(f": {text}" for text in meant)
     evidence: Evidence = {"x_px": x, "y_px": y}
     finding = found("P111", message, fix, evidence, key=f"cameras.{camera.name}.principal_point")
-    return replace(finding, severity=ERROR) if meant else finding
+    if meant or (np.abs(off) > size).any():
+        return replace(finding, severity=ERROR)
+    return replace(finding, fix=f"{fix}; is the photo a part of a larger one, `accept: [P111]`")
 
 
 def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding]:
@@ -342,6 +351,8 @@ def _wrong_unit(camera: Camera, reach: float, reading: UnitReading, photos: Sequ
             fix += ", or the principal distance"
     else:
         fix = "check `observations.unit`, `observations.origin` and the format of the camera"
+        if camera.unit == "px" and reach < LIKELY_REACH[0]:
+            fix = "are they in millimetres? A camera in pixels goes with columns and rows in pixels"
     evidence = {"reach": reach, "factor": reading.factor, "principal_distance_mm": camera.principal_distance}
     if camera.format is not None:
         evidence |= {"format_width_mm": camera.format[0], "format_height_mm": camera.format[1]}
@@ -361,9 +372,12 @@ def _unlikely_lens(camera: Camera) -> Finding | None:
     fits = sorted((each for each in meant if low < half / each < high), key=lambda each: abs(np.log(half / each)))
     fix = f"is it {camera.length(fits[0])}?" if fits else "take principal distance and format from the certificate"
     if camera.unit == "px":
-        converted = camera.in_unit(camera.in_unit(camera.principal_distance))  # read as mm, in pixels of a stated size
+        converted = camera.in_unit(camera.in_unit(camera.principal_distance))  # of mm, by the stated size
         least, most = (camera.length(half / each, in_pixels=".0f") for each in (high, low))
-        fix = f"`focal_length` is in pixels: mm divided by the size of a pixel in mm, here usually {least} to {most}"
+        fix = (
+            "`focal_length` is in pixels (mm divided by the size of a pixel in mm), of `opensfm` in parts of the larger"
+            f" side; here usually {least} to {most}"
+        )
         if camera.pixel_size != PIXEL_SIZE and low < camera.in_unit(half) / converted < high:
             fix = f"is it {converted:.0f} px? {fix}"
     message = (

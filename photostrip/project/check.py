@@ -25,7 +25,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted, listed
 from photostrip.pipeline import gate
 from photostrip.pipeline.frames import orient_interior
-from photostrip.pipeline.given_on_ground import over_control
+from photostrip.pipeline.given_cameras import over_control
 from photostrip.pipeline.inputs import (
     BUNDLE,
     Inputs,
@@ -95,6 +95,9 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     else:
         measured = (tables.observations,)
         sigma = {"image_sigma": sigma_of(project, "observations", measured, inputs.observations.sigma)}
+        pixels = {strip.camera.pixel_size if strip.camera.unit == "px" else None for strip in inputs.strips}
+        if len(pixels) == 1 and (pixel := pixels.pop()) is not None:
+            sigma["image_sigma"]["pixel_um"] = pixel * MICROMETRES
     gaps = gaps_of(inputs, used) if models is None else []
     if gaps and not project.settings.together:
         number = counted(len(gaps), "point is", "points are")

@@ -28,11 +28,7 @@ FOREMOST = "verdict", "findings", "check"  # sections before the pictures
 Name = tuple[str, str]  # what it is, and its id
 
 MOST_LINKS = 2  # rows, and pictures, to which one finding leads: one line of them
-OF_GROUND = {
-    "plan": "",
-    "footprints": "photo",
-    "ties": "photo",
-}  # what pictures of the ground show of findings; "": all
+OF_GROUND = {"plan": "", "footprints": "photo", "ties": "photo"}  # what pictures show of findings; "": all
 KINDS = {"point": "point", "photo": "photo", "photos": "photo"}  # heads of first columns
 
 

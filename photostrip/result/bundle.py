@@ -197,13 +197,13 @@ def positions_of(result: Result) -> Document:
     found, stated = result.bundle.screened, result.bundle.block.problem.positions.sigma
     given, used = np.isfinite(stated), np.isfinite(found.problem.positions.sigma)
     cofactor = np.diagonal(found.precision.position_residuals, axis1=1, axis2=2)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(used, cofactor, stated**2 - cofactor) / stated**2  # left out: minus that of the adjusted
-        over = found.solution.position_residuals / (stated * np.sqrt(share) * found.limit.unit)
+    sigma, off = np.where(given, stated, np.nan), np.where(given, found.solution.position_residuals, np.nan)
+    share = np.where(used, cofactor, sigma**2 - cofactor) / sigma**2  # left out: minus that of the adjusted
+    checked = np.where(share >= UNCONTROLLED, share, np.nan)
     values = {
-        "d": np.where(given, found.solution.position_residuals, np.nan),
-        "normalised": np.where(given & (share >= UNCONTROLLED), over, np.nan),
-        "sigma": np.where(given, stated, np.nan),
+        "d": off,
+        "normalised": off / (sigma * np.sqrt(checked) * found.limit.unit),
+        "sigma": sigma,
         "redundancy": np.where(used, share, np.nan),
     }
     words = np.array(("", *COUNTED), object)

@@ -1,5 +1,6 @@
 """Cameras of a project: distances between fiducial marks, k0 of a certificate, cameras in pixels."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -169,9 +170,10 @@ WRONG = [  # what is changed, the exit codes of check and run, what is told
     ({"format": "[1, 1]"}, 2, "cameras.digital.format: the key `format` is not known"),
     ({"measured": ("unit: px\n  y", "unit: mm\n  y")}, 2, "is given in pixels, the image coordinates are not"),
     ({"focal_length": 8.8}, 2, "focal_length: P105", "8.8 px and a format of 5500 x 3666.67 px", "1740 px to"),
-    ({"focal_length": 8.8, "pixel_size": 0.0024}, 2, "focal_length: P105", "is it 3667 px? `focal_length` is in pixel"),
+    ({"focal_length": 8.8, "pixel_size": 0.0024}, 2, "focal_length: P105", "is it 3667 px? `focal_length` is in"),
     ({"measured": ("y_axis: down", "y_axis: up")}, 2, "y_axis: P101", "y is counted the other way", "`y_axis: down`"),
     ({"convention": "metashape"}, 2, "principal_point: P111", "lies +2760 px in x and -1838 px in y (up)", CORNER),
+    ({"principal_point": "[27500, 18330]"}, 2, "P111", "+24750 px in x and -16497 px in y", "count it from where the"),
     ({"principal_point": "[2100, 1832]"}, 0, "P111", "lies -650 px in x", "`accept: [P111]`"),
 ]  # fmt: skip
 
@@ -190,8 +192,11 @@ def test_what_is_wrong_is_told_in_pixels(
 
 def test_no_size_of_a_pixel_is_invented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, result = in_pixels(tmp_path, "opencv", focal_length=3560), tmp_path / "result"
+    assert main(["check", str(path)]) == 0
+    assert " 0.5 px; " in capsys.readouterr().out
     assert main(["run", str(path), "-o", str(result), "--verbose"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
+    assert re.findall(r"[0-9] mm|mm\^", printed) == []
     assert "at a principal distance of 3650.8 px (standard deviation 9.7 px); 3560 px is given" in printed
     page = tmp_path / "report.html"
     assert main(["report", str(result), "-o", str(page)]) == 0
@@ -202,5 +207,6 @@ def test_no_size_of_a_pixel_is_invented(tmp_path: Path, capsys: pytest.CaptureFi
     for name in ("cameras.yaml", "cameras.opencv.yaml", "cameras.metashape.yaml"):
         assert main(["convert", str(result), str(tmp_path / name)]) == 0
         written = (tmp_path / name).read_text(encoding="utf-8")
+        assert "px by the calibration" in written
         assert "image_size: [5500, 3666.66" in written
         assert "pixel_size" not in written

@@ -56,8 +56,9 @@ def _contents(document: Document) -> Section:
 def _image_sigma(sigma: Document) -> str:
     if sigma["smallest_um"] is None:
         return DASH
-    low, high = (short(sigma[key]) for key in ("smallest_um", "largest_um"))
-    size = f"{low} µm" if low == high else f"{low} to {high} µm"
+    pixel = sigma.get("pixel_um")
+    low, high = (short(sigma[key] / (pixel or 1.0)) for key in ("smallest_um", "largest_um"))
+    size = (low if low == high else f"{low} to {high}") + (" px" if pixel else " µm")
     parts = []
     if sigma["rows_with_own"]:
         parts.append(f"{counted(sigma['rows_with_own'], 'row')} with their own")

@@ -8,9 +8,8 @@ photos, in percent of their sides, are 0.9 with hills of 60 m from 1530 m, 3.1 w
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import combinations, pairwise
-from operator import itemgetter
 
 import numpy as np
 
@@ -48,6 +47,7 @@ ROLES = {
     "check": ("check point", "square", 5.0),
     "control": ("control point", "triangle", 5.0),
 }
+RANKS = {"control": 1, "check": 2, "photo": 3, "new": 4}  # of names; those of findings go before
 CLASSES = 6
 
 
@@ -84,14 +84,13 @@ def plan_picture(plan: Plan) -> Picture:
     ring = [n for n, name in enumerate(plan.ids) if name in named]
     hints = [f"point {plan.ids[n]}: {', '.join(named[plan.ids[n]])}" for n in ring]
     layers.append(Marks(at[ring], "failed open", "dot", hints, "named by a finding or warning", 15.0))
-    ranks = {"control": 1, "check": 2, "new": 4}
     called, left_out = shortened(plan.photo_ids)
-    labels = [(0 if name in named else ranks[plan.role[n]], at[n], name) for n, name in enumerate(plan.ids)]
-    labels += [(3, plan.photos[n, :2], called[plan.photo_ids[n]]) for n in centres]
-    labels.sort(key=itemgetter(0))
-    counts = [sum(rank <= last for rank, *_ in labels) for last in range(4)]
+    names = [*plan.ids, *(called[plan.photo_ids[n]] for n in centres)]
+    ranks = [0 if name in named else RANKS[role] for name, role in zip(plan.ids, plan.role.tolist(), strict=True)]
+    rank = np.array(ranks + [RANKS["photo"]] * len(centres))
+    order, counts = np.argsort(rank, kind="stable"), [int((rank <= last).sum()) for last in range(RANKS["new"])]
     first = max((count for count in counts if count <= MOST_NAMED), default=MOST_NAMED)
-    layers.append(Names(np.array([place for _, place, _ in labels]), [name for *_, name in labels], first=first))
+    layers.append(Names(np.concatenate([at, plan.photos[centres, :2]])[order], [names[n] for n in order], first=first))
     bar = nice(2 * typical)
     caption = (
         f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}; "
@@ -102,9 +101,16 @@ def plan_picture(plan: Plan) -> Picture:
         f"{counted(len(plan.strips), 'strip')}, {counted(len(plan.ids), 'point')}; "
         "the tables of control and check points have the numbers."
     )
-    bars = [ground_bar(extent), Bar(bar * factor, f"residuals {length(bar)}", "soft")]
-    title = f"Plan of {document['name']}"
-    return chart("plan", (title, caption, description), [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)
+    said = f"Plan of {document['name']}", caption, description
+    return _map(plan, "plan", said, layers, extent, Bar(bar * factor, f"residuals {length(bar)}", "soft"))
+
+
+def _map(
+    plan: Plan, name: str, words: tuple[str, str, str], layers: Sequence[Layer], extent: float, *bars: Bar
+) -> Picture:
+    """Draw layers to scale, in as many rows as the plan takes, with a bar for an extent on the ground, metres."""
+    of_ground = Map(layers, rows=plan.map_rows)
+    return chart(name, words, [of_ground], bars=[ground_bar(extent), *bars], north=plan.north)
 
 
 def _extent(plan: Plan, at: Floats) -> float:
@@ -172,8 +178,7 @@ def _precision_map(plan: Plan, part: str, sigma: Floats, what: str) -> list[Pict
     caption = f"The {what} of each point: strong, large dots are known worst; the worst have their names."
     worst = f"the largest is {short(float(ordered[-1]), 3)} m at {plan.ids[order[-1]]}"
     said = f"Precision in {part}", caption, f"{counted(len(order), 'point')}; {worst}."
-    bars = [ground_bar(_extent(plan, at))]
-    return [chart(f"precision-{part}", said, [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)]
+    return [_map(plan, f"precision-{part}", said, layers, _extent(plan, at))]
 
 
 NEAR = 1.5  # distances to the points of a photo, within which all points tell of the ground
@@ -261,8 +266,7 @@ def footprint_pictures(plan: Plan) -> list[Picture]:
     if gsd := plan.document["summary"].get("gsd"):
         caption += f" Ground sample distance {short(gsd['median'], 3)} m, the median of the photos."
     words = "Footprints and overlap", caption + left_out, f"{counted(len(outlines), 'footprint')}."
-    bars = [ground_bar(_extent(plan, np.concatenate(corners)))]
-    return [chart("footprints", words, [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)]
+    return [_map(plan, "footprints", words, layers, _extent(plan, np.concatenate(corners)))]
 
 
 def area(outline: Floats) -> float:
@@ -368,9 +372,7 @@ def tie_pictures(plan: Plan) -> list[Picture]:
     if lone:
         caption += f" Without a common point: {listed(lone)}."
     words = f"{counted(len(nodes), what)}, {counted(len(ties), 'tie')}."
-    said = f"Ties between {what}s", caption, words
-    bars = [ground_bar(_extent(plan, at))]
-    return [chart("ties", said, [Map(layers, rows=plan.map_rows)], bars=bars, north=plan.north)]
+    return [_map(plan, "ties", (f"Ties between {what}s", caption, words), layers, _extent(plan, at))]
 
 
 def _shared(sights: Iterable[tuple[str, str]]) -> Counter[tuple[str, str]]:

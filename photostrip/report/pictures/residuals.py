@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.notes import Document, counted
+from photostrip.notes import Document, counted, given_in_pixels
 from photostrip.report.pictures.chart import (
     Areas,
     Bar,
@@ -164,13 +164,16 @@ def _cells(at: Floats, v: Floats, size: float) -> Floats:
 def distortion_pictures(document: Document) -> list[Picture]:
     """Draw the radial distortion of each lens, image to ideal: as given, and as the self-calibration has it."""
     panels = []
-    cameras = [each for each in document["cameras"] if each["format_mm"]]
+    cameras, own_unit = [each for each in document["cameras"] if each["format_mm"]], given_in_pixels(document)
     for camera in cameras:
         radius = np.linspace(0.0, float(np.hypot(*camera["format_mm"])) / 2.0, CURVE)
         given, layers = _given_distortion(camera, radius), list[Layer]()
+        pixel = own_unit.get(camera["id"])
+        axes = ("px from the principal point", "px") if pixel else ("mm from the principal point", "µm")
+        scale = np.array([1.0, 0.001]) / pixel if pixel else np.ones(2)
         found = [row for row in _calibrated(document) if row["camera"] == camera["id"] and row["parameter"] in RADIAL]
         if given is not None:
-            layers.append(Line(np.column_stack([radius, given]), "c1 dashed", "given"))
+            layers.append(Line(scale * np.column_stack([radius, given]), "c1 dashed", "given"))
         if found:
             powers = np.column_stack([1000.0 * radius ** RADIAL[row["parameter"]] for row in found])
             adjusted = (0.0 if given is None else given) + powers @ [row["value"] for row in found]
@@ -179,15 +182,13 @@ def distortion_pictures(document: Document) -> list[Picture]:
             sigma = np.array([row["sigma"] for row in found])
             covariance = np.outer(sigma, sigma) * [[row["correlations"][n] for n in at] for row in found]
             spread = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", powers, covariance, powers), 0.0))
-            layers.append(Line(np.column_stack([radius, adjusted]), "c2", "adjusted"))
+            layers.append(Line(scale * np.column_stack([radius, adjusted]), "c2", "adjusted"))
             layers += [
-                Line(np.column_stack([radius, adjusted + side * spread]), "c2 thin dotted", words)
+                Line(scale * np.column_stack([radius, adjusted + side * spread]), "c2 thin dotted", words)
                 for side, words in ((1.0, "its standard deviation"), (-1.0, ""))
             ]
         if layers:
-            panels.append(
-                Panel(layers, camera["id"] if len(cameras) > 1 else "", ("mm from the principal point", "µm"))
-            )
+            panels.append(Panel(layers, camera["id"] if len(cameras) > 1 else "", axes))
     if not panels:
         return []
     caption = "Radial distortion, what is added to an image point away from the principal point to make it ideal."

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import nlargest
 from itertools import groupby
 from math import floor, log10
 from operator import itemgetter
+from typing import Any
 
-from photostrip.notes import Document, counted, listed
+from photostrip.notes import Document, counted, given_in_pixels, in_pixels, listed
 from photostrip.report.page.parts import Column, Facts, Part, Table, Words
 from photostrip.report.page.tables import (
     Cell,
@@ -185,10 +186,13 @@ def shared_parameters(document: Document) -> Iterator[Part]:
 def camera(document: Document) -> Iterator[Part]:
     """Give each camera as an adjustment estimated it, like the sheet of a calibration."""
     block = document.get("bundle", {})
-    rows, pixels = block.get("calibration", ()), pixel_sizes(document)
+    rows, pixels, own_unit = block.get("calibration", ()), pixel_sizes(document), given_in_pixels(document)
     names = list(rows.values("camera")) if len(rows) else []
     for name in dict.fromkeys(names):
-        yield from _calibration(name, rows.where(camera=name), names, pixels.get(name))
+        own = rows.where(camera=name)
+        if name in own_unit:
+            own = [in_pixels(row, own_unit[name]) for row in own]
+        yield from _calibration(name, own, rows.quantities, names, pixels.get(name))
     if names:
         yield from _highly_correlated(block["correlations"], of_cameras=True)
         yield Words("`photostrip convert RESULT cameras.yaml` writes the adjusted cameras, for a project or a program.")
@@ -207,24 +211,29 @@ def pixel_sizes(document: Document) -> dict[str, float]:
     return {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"] if camera["pixel_size_mm"]}
 
 
-def _calibration(name: str, own: Rows, cameras: list[str], pixel: float | None) -> Iterator[Table]:
+def _calibration(
+    name: str, own: Rows, quantities: Mapping[str, Any], cameras: list[str], pixel: float | None
+) -> Iterator[Table]:
     """Give the parameters of a camera, and the correlations between them.
 
-    cameras: of all parameters.
+    quantities: what their columns are; cameras: of all parameters.
     """
-    keys = f"camera parameter given adjusted value sigma unit corner_um {'pixels ' * bool(pixel)}p:1 significant"
+    corner = "pixels" if own[0]["unit"].startswith("px") else "corner_um pixels" if pixel else "corner_um"
+    keys = f"camera parameter given adjusted value sigma unit {corner} p:1 significant"
     adjusted, value = (
         (Field(key, " g4", head), [_to_sigma(row.get(key), row["sigma"]) for row in own])
         for key, head in (("adjusted", "adjusted"), ("value", "difference"))
     )
-    corner = [row.get("corner_um") for row in own]
-    pixels = [each / (1000.0 * pixel) if pixel and each is not None else None for each in corner]
+    moved = [row.get("corner_um") for row in own]
+    pixels = [each / (1000.0 * pixel) if pixel and each is not None else None for each in moved]
     note = (name == cameras[-1]) * (
         "difference: adjusted minus given; at the corner: how far it moves an image point in a corner of the photo; p: "
         "probability of a difference this large where the given value is right; k, p, affinity, shear: of what is "
         "added to a measured image point to make it free of distortion"
     )
-    yield keyed(own, keys, note, adjusted=adjusted, value=value, pixels=(Field("pixels", "px 2", "", rank=1), pixels))
+    alone = "corner_um" not in keys
+    of_pixels = Field("pixels", "px 2", "at the corner" * alone, rank=1 - alone), pixels
+    yield keyed(own, keys, note, quantities=quantities, adjusted=adjusted, value=value, pixels=of_pixels)
     places = [n for n, each in enumerate(cameras) if each == name]
     lines = [
         (
@@ -274,7 +283,7 @@ def _whose(row: Document) -> str:
 def estimated(document: Document, most: int) -> Iterator[Row]:
     """Say in a line for each camera and group of positions what was estimated; of many the most significant."""
     block = document["bundle"]
-    found = [*_cameras(block, pixel_sizes(document)), *_positions(block["corrections"])]
+    found = [*_cameras(block, pixel_sizes(document), given_in_pixels(document)), *_positions(block["corrections"])]
     for place in sorted(nlargest(most, range(len(found)), key=lambda place: found[place][1])):
         yield "estimated", found[place][0]
     if len(found) > most:
@@ -292,10 +301,10 @@ def estimated(document: Document, most: int) -> Iterator[Row]:
         yield "highly correlated", listed(pairs, most)
 
 
-def _cameras(block: Document, pixels: dict[str, float]) -> Iterator[tuple[str, float]]:
+def _cameras(block: Document, pixels: dict[str, float], own_unit: dict[str, float]) -> Iterator[tuple[str, float]]:
     """Give what was estimated of each camera, and the largest value in units of its standard deviation."""
     for camera, group in groupby(block["calibration"], key=itemgetter("camera")):
-        own = list(group)
+        own = [in_pixels(each, own_unit[camera]) if camera in own_unit else each for each in group]
         said = ", ".join(_parameter(each, pixels.get(camera)) for each in own)
         said += "; with correlations: --section camera" * (len(own) > 1)
         yield f"camera {camera}: added {said}", _largest(own, "value", "sigma")

@@ -370,10 +370,15 @@ def _by_point(marks: Sequence[Document], unit: str, decimals: int) -> Table:
     columns, rows = (Field("point"), Field("role"), Field("marks", " 0"), *sizes, Field("on")), []
     for _, group in groupby(marks, itemgetter("point")):
         own = list(group)
-        worst = max(own, key=itemgetter("length"))
-        rms = (sum(mark["length"] ** 2 for mark in own) / (2 * len(own))) ** 0.5
+        rms, worst = _rms_and_worst(own)
         rows.append([worst["point"], worst["role"], len(own), rms, worst["length"], worst["photo"]])
     return tabulated(columns, rows, "rms of a coordinate; largest: the mark farthest from its point")
+
+
+def _rms_and_worst(marks: Sequence[Document]) -> tuple[float, Document]:
+    """Return the rms of a coordinate of marks, and the mark farthest from its point."""
+    rms = (sum(mark["length"] ** 2 for mark in marks) / (2 * len(marks))) ** 0.5
+    return rms, max(marks, key=itemgetter("length"))
 
 
 def _marks(document: Document) -> Iterator[Document]:
@@ -406,8 +411,7 @@ def _summed(marks: Sequence[Document], form: str) -> Iterator[tuple[str, str]]:
     for role in ("control", "check"):
         own = [mark for mark in marks if mark["used"] and mark["role"] == role]
         if own:
-            rms = (sum(mark["length"] ** 2 for mark in own) / (2 * len(own))) ** 0.5
-            worst = max(own, key=itemgetter("length"))
+            rms, worst = _rms_and_worst(own)
             largest = f"{with_unit(worst['length'], form)} at {worst['point']} on {worst['photo']}"
             yield role, f"{counted(len(own), 'mark')}, rms {with_unit(rms, form)}; largest {largest}"
 
