@@ -207,8 +207,8 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
     with np.errstate(invalid="ignore"):
         off = np.nan_to_num(np.abs(linearise(prepared, state).control))
     begun = linearise(prepared, prepared.begun)
-    apart = begun.positions.residual * begun.positions.weight
-    apart = float(np.median(np.linalg.norm(apart, axis=1))) if len(apart) else 0.0
+    sigmas = np.linalg.norm(begun.positions.residual * begun.positions.weight, axis=1)
+    apart = float(np.median(sigmas)) if len(sigmas) else 0.0
     if loose:
         message += f": {loose}"
     elif apart > max(ODD_SIGMAS, APART * np.nan_to_num(np.abs(begun.control)).max(initial=0.0)):
