@@ -91,7 +91,8 @@ COSINE_ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
 LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter
 STRAIGHT_BREADTH = 1e-3  # breadth of control on one line, as part of its length
 GROWN = 4.0  # times the standard deviation of a given coordinate, rms of the points, from which a movement is told
-ODD_SIGMAS = 10.0  # standard deviations of a control coordinate that is told then
+ODD_SIGMAS = 10.0  # standard deviations of a control coordinate, or of camera positions, that is told then
+APART = 0.5  # of those of the worst control coordinate, beyond which all camera positions are off, not one point
 ITERATIONS = 3
 MOST_FAILED = 8  # adjustments of a search that may fail: each takes six times as long as one that converges
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
@@ -197,15 +198,25 @@ def weak(prepared: PreparedProblem, state: Parameters) -> str:
 def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> GeometryError:
     """Say that an adjustment does not converge (``bundle-diverged``), and what speaks against it.
 
-    That is a movement that is hardly determined; else the control that is farthest off.
+    That is a movement that is hardly determined; else camera positions that lie elsewhere than the control has the
+    photos, at the start, because steps mix both; else the control that is farthest off.
     """
     message = f"the bundle adjustment did not converge in {counted(steps, 'step')}"
     control = prepared.problem.control
     loose = "" if is_free(prepared.problem) else weak(prepared, prepared.begun)
     with np.errstate(invalid="ignore"):
         off = np.nan_to_num(np.abs(linearise(prepared, state).control))
+    begun = linearise(prepared, prepared.begun)
+    sigmas = np.linalg.norm(begun.positions.residual * begun.positions.weight, axis=1)
+    apart = float(np.median(sigmas)) if len(sigmas) else 0.0
     if loose:
         message += f": {loose}"
+    elif apart > max(ODD_SIGMAS, APART * np.nan_to_num(np.abs(begun.control)).max(initial=0.0)):
+        metres = float(np.median(np.linalg.norm(begun.positions.residual, axis=1)))
+        message += (
+            f": camera positions and control contradict each other by {metres:.3g} m or more; is the crs, unit or kind "
+            "of height of one of them wrong?"
+        )
     elif off.max(initial=0.0) > ODD_SIGMAS:
         row, axis = np.unravel_index(int(off.argmax()), off.shape)
         point = prepared.problem.point_name(int(control.point[row]))

@@ -38,7 +38,7 @@ MOST_HEIGHT_RATIO = 1.3  # flying height given over that of the photo scale, or 
 LEAST_HEIGHTS = 3  # photos whose flying height is known from their scale
 ELSEWHERE = 0.23  # misfit of rays to control, in parts of their spread, of centres 30 % too high
 AGREES = 0.03, 0.1  # misfit of centres that are where photos and control have them: by a lens, an antenna; at most
-FAR = 10.0  # flying heights beside the control that a photo shows, where its scale says nothing of its height
+FLAT = 3.0  # heights beside the control that a photo shows, beyond which it would look along the ground
 MOST_PAIRS = 24  # of photos that are oriented to each other
 KILOMETRES = 1000.0
 UP = np.array([0.0, 0.0, 1.0])  # of a level plane, and of a strip of models with perspective centres
@@ -199,7 +199,8 @@ class OverControl:
     def above(self) -> tuple[Floats, Floats]:
         """Height (n,) of the control that each photo shows, and how many times too far from it its centre is given.
 
-        The angles between rays say that, whichever way the camera looks; not far beside the control. NaN: not known.
+        The angles between rays say that, whichever way the camera looks. A centre so low that it would look along the
+        ground says it by the scale of its photo, as that of a level one. NaN: not known, far beside the control.
         """
         height, times = np.full((2, len(self.given.photos)), np.nan)
         if self.plan is None:
@@ -208,8 +209,13 @@ class OverControl:
             arm = each.arms(self.plan)
             height[each.station] = np.median(self.plan.control[each.number, HEIGHT])
             given, measured = _spread(_unit(arm)), _spread(each.measured)
-            if given > 0 and measured > 0 and _beside(arm) < FAR:
-                times[each.station] = measured / given
+            if given > 0 and measured > 0:
+                beside, low = np.median(np.linalg.norm(arm[:, :2], axis=1)), abs(np.median(arm[:, 2]))
+                by_scale = _spread(arm) / _spread(each.measured / np.abs(each.measured[:, 2:]))
+                if beside < FLAT * low:
+                    times[each.station] = measured / given
+                elif beside < FLAT * by_scale:
+                    times[each.station] = low / by_scale
         return height, times
 
     @cached_property
@@ -320,11 +326,6 @@ def _spread(directions: Floats) -> float:
     return float(np.sqrt(((directions - directions.mean(axis=0)) ** 2).sum()))
 
 
-def _beside(arm: Floats) -> float:
-    """How far points lie beside a centre, in its heights above them."""
-    return float(np.median(np.linalg.norm(arm[:, :2], axis=1)) / max(abs(np.median(arm[:, 2])), 1e-12))
-
-
 def _other_height(at: OverControl, rows: Numbers, strip: Strip | None = None) -> Finding | None:
     """Compare the height of centres above the control with the scale of their photos: of a strip, or of all."""
     ground, ratio = (each[rows] for each in at.above)
@@ -342,7 +343,7 @@ def _other_height(at: OverControl, rows: Numbers, strip: Strip | None = None) ->
         f"control, and the scale of the photos requires {wanted:.4g} m"
     )
     numbers = {"given_above_control_m": given, "by_photo_scale_m": wanted}
-    fix = "are their heights in another unit, or of another vertical datum? or is the principal distance wrong?"
+    fix = "are their heights above the ground, in another unit or datum? or is the principal distance wrong?"
     photos, strips = [at.given.photos[row] for row in rows.tolist()], (strip.id,) if strip else ()
     return found("P205", message, fix, numbers, photos=photos, strips=strips, key=at.given.key)
 

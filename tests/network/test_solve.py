@@ -10,6 +10,7 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
+from photostrip.network import problem as bundle
 from photostrip.network.adjustment import solve
 from photostrip.network.problem import BundleProblem, ControlObservations, ImageObservations, StartValues
 from photostrip.simulation import Control as SimulatedControl
@@ -89,23 +90,26 @@ def test_a_photo_with_too_few_points_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("breadth", "off", "words"),
+    ("breadth", "off", "beside", "words"),
     [
-        (0.0, 0.0, r"did not converge in 1 step$"),
-        (0.02, 0.0, r"hardly determines roll about the flight line of the whole: .*, where a given coordinate has"),
-        (0.0, 5.0, r"control point .* m off, .* times its standard deviation; are its coordinates or its id wrong"),
+        (0.0, 0.0, 0.0, r"did not converge in 1 step$"),
+        (0.0, 0.0, 500.0, r"camera positions and control contradict each other by 500 m or more"),
+        (0.02, 0.0, 0.0, r"hardly determines roll about the flight line of the whole: .* a given coordinate"),
+        (0.0, 5.0, 0.0, r"control point .* m off, .* deviation; are its coordinates or its id wrong"),
     ],
 )
 def test_steps_without_end_say_what_is_wrong_with_the_control(
-    breadth: float, off: float, words: str, monkeypatch: pytest.MonkeyPatch
+    breadth: float, off: float, beside: float, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem, _ = simulated(6)
+    problem, truth = simulated(6)
+    if beside:
+        given, axes, zeros = truth.centers + np.array([0, 0, beside]), np.tile(np.eye(3), (6, 1, 1)), np.zeros((6, 3))
+        observed = (np.arange(6), given, axes, zeros + 0.1, zeros, np.full(6, -1), np.zeros(6))
+        problem = replace(problem, positions=bundle.PositionObservations(*observed))
     xyz = problem.control.xyz.copy()
-    if breadth:
-        middle = xyz - xyz.mean(axis=0)
-        axis = np.linalg.svd(middle)[2][0]
-        along = np.outer(middle @ axis, axis)
-        xyz = xyz.mean(axis=0) + along + breadth * (middle - along)
+    middle = xyz - xyz.mean(axis=0)
+    axis = np.linalg.svd(middle)[2][0]
+    xyz -= (1.0 - (breadth or 1.0)) * (middle - np.outer(middle @ axis, axis))
     xyz[0, 0] += off
     monkeypatch.setattr("photostrip.network.adjustment.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match=words) as caught:
