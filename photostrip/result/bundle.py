@@ -147,9 +147,7 @@ def _calibration(result: Result, found: Bundle) -> list[Document]:
     rows, like = [], np.arange(len(problem.camera_ids)) if problem.cameras.like is None else problem.cameras.like
     for each, row in zip(found.parameters, covariance / np.outer(sigma, sigma), strict=True):
         number, column = problem.camera_ids.index(each.camera), columns.index(each.name)
-        camera = result.inputs.camera_named[
-            problem.camera_ids[like[number]]
-        ]  # a photo that is shifted has one of its own like it
+        camera = cameras[problem.camera_ids[like[number]]]  # a photo that is shifted has one of its own like it
         measured = problem.cameras.of_photo[problem.images.photo] == number
         given = _given_calibration(camera)[column]
         rows.append(
