@@ -97,6 +97,11 @@ class ScreenedBundle:
             limit=reliability.limit_of(solution, settings, tests, established, BOTH_GO if rough else 1.0),
         )
 
+    @property
+    def out(self) -> list[Rejection]:
+        """What was taken out and stays out."""
+        return [each for each in self.rejections if not each.readmitted]
+
     @cached_property
     def joint(self) -> JointCofactors:
         return JointCofactors.of_solution(self.solution)
@@ -135,7 +140,7 @@ def screen_bundle(
     done = _searched(search, begin)
     # standard deviations stay: their factor is that of most positions, whichever others are wrong
     taken = [each for each in (*search.common, *search.refused) if each.kind != SIGMAS]
-    lost = done.held or any(each.kind != IMAGE and not each.readmitted for each in done.rejections)
+    lost = done.held or any(each.kind != IMAGE for each in done.out)
     if not (taken and lost) and not any(each.kind in OF_PHOTOS for each in taken):
         return done
     other = _Search(problem, begin, settings, kept, rough=rough, refused=taken)
@@ -152,8 +157,8 @@ def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> floa
     observations = done.problem
     photos = sum(each.kind in OF_PHOTOS for each in done.common)
     given = int(sum(np.isfinite(each.sigma).sum() for each in (observations.control, observations.positions)))
-    rays_out = sum(each.kind == IMAGE and not each.readmitted for each in done.rejections)
-    given_out = sum(each.kind != IMAGE and not each.readmitted for each in done.rejections)
+    rays_out = sum(each.kind == IMAGE for each in done.out)
+    given_out = len(done.out) - rays_out
     asked = rays_out, given_out, photos, len(done.common) - photos
     numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
     price = 2.0 * xlogy(asked, np.array(numbers) / level).sum()  # of nothing that is asked of nothing: 0

@@ -129,8 +129,8 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
     """Name control and camera positions that contradict the rest, whether they were taken out or had to stay."""
     problem = bundle.block.problem
     early = "found in its strip" if bundle.start.strips else "found before the adjustment"
-    for each in sorted(bundle.screened.rejections, key=lambda each: -abs(each.worst)):
-        if not each.readmitted and each.kind != reliability.IMAGE:
+    for each in sorted(bundle.screened.out, key=lambda each: -abs(each.worst)):
+        if each.kind != reliability.IMAGE:
             text, photos, points = _contradiction(problem, each, early)
             text += "; not used"
             yield Note("control-rejected" if points else "position-rejected", text, photos=photos, points=points)
@@ -183,8 +183,8 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
         for strip, (_, begin) in zip(start.strips, places, strict=True)
     )
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
-    cameras = {strip.camera.name: strip.camera for strip in inputs.strips}
-    return _in_one_network(bundle, calibrated, strips, points, photos, np.median(block.problem.images.sigma), cameras)
+    sigma = np.median(block.problem.images.sigma)
+    return _in_one_network(bundle, calibrated, strips, points, photos, sigma, inputs.camera_named)
 
 
 def _in_one_network(

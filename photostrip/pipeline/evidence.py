@@ -176,8 +176,7 @@ def of_units(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None 
 
     photo: image points in the system of the photo, where a run has them already.
     """
-    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    return accepted(_photo_coordinates(inputs, cameras, settings, photo)[1], settings.accept)
+    return accepted(_photo_coordinates(inputs, settings, photo)[1], settings.accept)
 
 
 def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None = None) -> ImageEvidence:
@@ -185,8 +184,7 @@ def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None
 
     photo: image points in the system of the photo, where a run has them already.
     """
-    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    observations, findings, of_camera = _photo_coordinates(inputs, cameras, settings, photo)
+    cameras, (observations, findings, of_camera) = inputs.cameras, _photo_coordinates(inputs, settings, photo)
     factor = {name: of_camera[cameras[name].name] for name in observations.photo_ids}
     in_unit = _put_right(observations, factor, frozenset())
     orders = []
@@ -216,13 +214,13 @@ def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None
 
 
 def _photo_coordinates(
-    inputs: Inputs, cameras: dict[str, Camera], settings: Settings, photo: PhotoCoordinates | None
+    inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None
 ) -> tuple[PhotoPoints, list[Finding], dict[str, float]]:
     """Image points in the system of the photo, what marks and sizes say, and the factor that a camera's size asks for.
 
     Nothing is said where the marks give no such system: what is wrong with them stops the run.
     """
-    oriented = None if photo is None else photo.interior
+    cameras, oriented = inputs.cameras, None if photo is None else photo.interior
     observations = _on_listed_photos(inputs.observations, cameras) if photo is None else photo.observations
     if photo is None and inputs.fiducials is not None:
         from photostrip.strip import interior

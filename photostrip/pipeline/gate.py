@@ -350,9 +350,7 @@ def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:
 def _contradicted(finding: Finding, bundle: Bundle) -> bool:
     """Whether a bundle did not go with all given positions of the photos of a finding, or took up what they share."""
     screened, problem = bundle.screened, bundle.block.problem
-    rows = [
-        each.row for each in (*screened.rejections, *screened.held) if each.kind == POSITION and not each.readmitted
-    ]
+    rows = [each.row for each in (*screened.out, *screened.held) if each.kind == POSITION]
     named = {problem.photo_ids[n] for n in problem.positions.photo[rows].tolist()}
     return not named.isdisjoint(finding.photos) or any(each.kind in (OFFSET, DRIFT, ORDER) for each in screened.common)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -133,9 +134,15 @@ class Inputs:
     # pixels counted from a corner, which lie on one side of it
     other_hand: str = "`observations.y_axis: down`"
 
-    @property
+    @cached_property
     def cameras(self) -> dict[str, Camera]:
+        """Camera of every photo."""
         return {photo: strip.camera for strip in self.strips for photo in strip.photos}
+
+    @cached_property
+    def camera_named(self) -> dict[str, Camera]:
+        """Cameras by their names, in the order of the strips."""
+        return {strip.camera.name: strip.camera for strip in self.strips}
 
     @property
     def flights(self) -> tuple[Strip | ModelStrip, ...]:

@@ -180,8 +180,7 @@ def of_bundle(bundle: Bundle, inputs: Inputs, settings: Settings) -> Iterator[Fi
     shared = bundle.screened.common
     yield from (_list(each, inputs) for each in shared if each.kind == LIST)
     if any(each.kind == DISTANCE for each in shared):
-        cameras = {strip.camera.name for strip in inputs.strips}
-        of_cameras = (each for each in bundle.parameters if each.camera in cameras)
+        of_cameras = (each for each in bundle.parameters if each.camera in inputs.camera_named)
         yield from (_distance(each, inputs) for each in of_cameras if _is_distance(each))
     radius = settings.absolute.earth_radius if curvature_left_out(inputs, settings) else None
     yield from _lens([each for each in shared if each.kind in OF_LENSES], bundle, inputs, radius)
@@ -391,7 +390,7 @@ def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     if error.kind == SHIFT:
         x, y = (each for each in own if each.name.startswith("principal_point"))
         # in the adjustment the photo has a camera of its own
-        written, owner = ("+.2f", "+.1f"), next(each.camera for each in inputs.strips if name in each.photos)
+        written, owner = ("+.2f", "+.1f"), inputs.cameras[name]
         how = (
             f"shifted by {owner.length(x.value, *written)} in x and {owner.length(y.value, *written)} in y (standard "
             f"deviations {owner.in_unit(x.sigma):.2g} and {owner.length(y.sigma, '.2g', '.2g')})"
@@ -431,7 +430,7 @@ def _photos(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Fin
 
 def _camera(name: str, inputs: Inputs) -> Camera:
     """Return a camera by its name; of a shifted photo, which no strip names, one that is given as its own is."""
-    return next((each.camera for each in inputs.strips if each.camera.name == name), inputs.strips[0].camera)
+    return inputs.camera_named.get(name, inputs.strips[0].camera)
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:
@@ -473,7 +472,7 @@ def _finding(
     if DISTANCE in error.rivals:
         message += ". A wrong principal distance would explain it nearly as well"
     given = int(np.isfinite(bundle.block.problem.control.sigma).sum())
-    rejected = sum(each.kind == CONTROL and not each.readmitted for each in bundle.screened.rejections)
+    rejected = sum(each.kind == CONTROL for each in bundle.screened.out)
     if rejected > given / 2:
         message += (
             f". Control and camera positions contradict each other: {rejected} of {given} control coordinates were "

@@ -197,6 +197,10 @@ def orient_on_control(
         if stage.formed.upright:
             raise _left_handed(stage.strip) from refusal
         oriented = to_ground(stage.overturned(), *held, frames, settings)
+    except GeometryError:  # of a narrow strip that lies upside down, the control seems to lie on a line
+        if stage.formed.upright:
+            raise
+        oriented = to_ground(stage.overturned(), *held, frames, settings)
     _refuse_other_hand(oriented)
     return oriented
 

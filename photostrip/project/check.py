@@ -145,14 +145,13 @@ def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:
 def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     """Look at fiducial marks and distortion; what is refused there refuses the project."""
     inputs, notes = project.inputs, []
-    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
     try:
         with project.places():
             photo = orient_interior(inputs, project.settings)
             notes = [] if photo.interior is None else list(photo.interior.notes)
             # refraction and curvature need heights that only a run can find; they refuse nothing in a file
             wanted = replace(project.settings.refinement, refraction=False, earth_radius=None)
-            corrections.refine(photo.observations, cameras, wanted)
+            corrections.refine(photo.observations, inputs.cameras, wanted)
     except InputError as error:
         faults += error.faults
     except GeometryError as error:
@@ -478,7 +477,7 @@ def table_rows(project: Project, tables: Tables, gaps: Sequence[str]) -> list[Do
         measured = (each for each in (tables.models.points, tables.models.centers) if each is not None)
         parts += [(each.table, _among(each.model_ids, known)[each.models], None) for each in measured]
     else:
-        photos = {photo for strip in inputs.strips for photo in strip.photos}
+        photos = set(inputs.cameras)
         whole = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if bundle and use.all()}
         count = {} if tables.observations is None else rays(tables.observations, photos)
         apart = set() if bundle else set(gaps)

@@ -125,7 +125,7 @@ def _sigma0(found: Bundle) -> Document:
 
 def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, GroupKind]) -> Document:
     screened = found.screened
-    out = [each for each in screened.rejections if not each.readmitted]
+    out = screened.out
     return {
         "method": settings.screening,
         "test": settings.test,
@@ -142,8 +142,7 @@ def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, Gr
 def _calibration(result: Result, found: Bundle) -> list[Document]:
     """Return the parameters of the self-calibration: the first of the common unknowns."""
     covariance = found.screened.precision.common[: len(found.parameters), : len(found.parameters)]
-    sigma = np.sqrt(np.diag(covariance))
-    cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
+    sigma, cameras = np.sqrt(np.diag(covariance)), result.inputs.camera_named
     problem, columns = found.screened.problem, [each.title for each in CALIBRATION.values()]
     rows, like = [], np.arange(len(problem.camera_ids)) if problem.cameras.like is None else problem.cameras.like
     for each, row in zip(found.parameters, covariance / np.outer(sigma, sigma), strict=True):
@@ -272,18 +271,17 @@ def image_fit(found: Bundle) -> Document:
 def _group(group: reliability.Group, shift: float, kind: GroupKind) -> Document:
     """Sum up the redundancy of one kind of observations; effects of errors of those that others check."""
     given = np.isfinite(group.sigma)
-    controlled = group.redundancy[given] >= UNCONTROLLED
+    controlled = given & (group.redundancy >= UNCONTROLLED)
     share = group.redundancy[given] if given.any() else np.zeros(1)  # where all of the group was rejected
-    nothing = np.array([np.nan])
-    detectable = group.detectable(shift)[given][controlled] * kind.factor if controlled.any() else nothing
-    external = group.external(shift)[given][controlled] if controlled.any() else nothing
+    effects = group.detectable(shift) * kind.factor, group.external(shift)
+    detectable, external = (each[controlled] if controlled.any() else np.array([np.nan]) for each in effects)
     return {
         "group": kind.name,
         "observations": int(given.sum()),
         "redundancy": share.sum(),
         "mean": share.mean(),
         "smallest": share.min(),
-        "uncontrolled": int((~controlled).sum()),
+        "uncontrolled": int((given & ~controlled).sum()),
         "detectable": np.median(detectable),
         "detectable_largest": detectable.max(),
         "unit": kind.unit,

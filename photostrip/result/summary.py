@@ -93,7 +93,7 @@ def angles_of(result: Result) -> Document:
 
 def cameras_of(result: Result) -> Table:
     """Return the table ``cameras``, in the order of the strips."""
-    cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
+    cameras = result.inputs.camera_named
     in_pixels = any(camera.unit == "px" for camera in cameras.values())
     rows = [
         {
@@ -198,7 +198,7 @@ def counts_of(result: Result, measurements: int) -> Document:
     used = sum(len(strip.rows) for strip in result.photo_strips)
     if bundle is not None and not result.model_strips:
         used = int(bundle.screened.selection.images.sum())
-    out = [] if bundle is None else [each for each in bundle.screened.rejections if not each.readmitted]
+    out = [] if bundle is None else bundle.screened.out
     return {
         "strips": len(result.inputs.lines),
         "photos": sum(len(strip.photos) for strip in result.inputs.flights),

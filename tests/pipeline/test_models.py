@@ -58,6 +58,13 @@ def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str,
     assert np.abs(result.ties.difference).max() < EXACT
 
 
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_narrow_strip_without_centres_may_lie_either_way_up(seed: int) -> None:
+    asked = Models(sigma_um=FREE, axes="any", centers=False)
+    simulated = simulate(Spec(seed=seed, flight=Flight(photos=20), control=Control(noise=FREE), models=asked))
+    assert np.abs(errors(simulated, triangulate(inputs_of(simulated), Settings(precision=False)))).max() < EXACT
+
+
 @pytest.mark.parametrize("coordinates", [100, 27])
 def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordinates: int) -> None:
     """In sections, too."""
