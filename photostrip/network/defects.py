@@ -207,12 +207,12 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
     with np.errstate(invalid="ignore"):
         off = np.nan_to_num(np.abs(linearise(prepared, state).control))
     begun = linearise(prepared, prepared.begun)
-    sigmas = np.linalg.norm(begun.positions.residual * begun.positions.weight, axis=1)
-    apart = float(np.median(sigmas)) if len(sigmas) else 0.0
+    residual, weight = begun.positions.residual, begun.positions.weight
+    apart = float(np.median(np.linalg.norm(residual * weight, axis=1))) if len(residual) and len(control) else 0.0
     if loose:
         message += f": {loose}"
     elif apart > max(ODD_SIGMAS, APART * np.nan_to_num(np.abs(begun.control)).max(initial=0.0)):
-        metres = float(np.median(np.linalg.norm(begun.positions.residual, axis=1)))
+        metres = float(np.median(np.linalg.norm(residual * (weight > 0.0), axis=1)))
         message += (
             f": camera positions and control contradict each other by {metres:.3g} m or more; is the crs, unit or kind "
             "of height of one of them wrong?"

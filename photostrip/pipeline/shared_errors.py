@@ -407,7 +407,10 @@ def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
         "neighbouring photos. The adjustment continued so"
     )
     strips = [strip.id for strip in inputs.strips if name in strip.photos]
-    return found("P109", message, CAUSES[error.kind].cure, numbers, photos=(name,), strips=strips)
+    cure = CAUSES[error.kind].cure
+    if error.number in problem.positions.photo:
+        cure += "; or is its camera position wrong? over level ground both look alike"
+    return found("P109", message, cure, numbers, photos=(name,), strips=strips)
 
 
 def _photos(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Finding:
