@@ -42,11 +42,7 @@ from photostrip.pipeline.inputs import (
     rows_of_models,
 )
 from photostrip.pipeline.precision import mean_points
-from photostrip.pipeline.results import (
-    BlockProblem,
-    BlockStart,
-    StripResult,
-)
+from photostrip.pipeline.results import BlockProblem, BlockStart, StripResult
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, locate, located
 from photostrip.strip.control_screening import majority
 from photostrip.strip.resection import KnownPhotos, project

@@ -26,10 +26,7 @@ from photostrip.pipeline.evidence import HeldStrip, OnControl
 from photostrip.pipeline.formed_models import LinkedModels
 from photostrip.pipeline.formed_photos import FormedPhotos
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
-from photostrip.pipeline.inputs import (
-    Inputs,
-    Settings,
-)
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import Result
 from photostrip.plausibility import given_points, units
 from photostrip.plausibility.given_points import LIMIT

@@ -49,16 +49,6 @@ MOST_SIZES = 10.0  # of a photo, that one which was taken for it is larger at mo
 BEGIN_SHARE = 0.2  # of their reach: points that are counted from a corner begin nearer to it
 AT_CORNER = 0.15  # of half the format: how near the middle of the points is to where another origin would put it
 PLACE_OF_POINT = 0.1  # of the format: how far a principal point may lie from the middle of photos as they were taken
-READINGS = (
-    (1e-3, "micrometres read as millimetres"),
-    (1e3, "millimetres read as micrometres"),
-    (0.1, "the decimal point one place off, or tenths of a micrometre (`0.1um`) read as micrometres"),
-    (10.0, "the decimal point one place off, or centimetres read as millimetres"),
-    (1e-4, "tenths of a micrometre read as millimetres"),
-    (INCH, "inches read as millimetres"),
-    (1e-2, "the decimal point two places off, or hundredths of a millimetre read as millimetres"),
-    (1e2, "the decimal point two places off"),
-)
 
 
 class UnitReading(NamedTuple):
@@ -68,30 +58,36 @@ class UnitReading(NamedTuple):
     name: str  # what may have happened; empty when nothing is known that explains it
 
 
+READINGS = (
+    UnitReading(1e-3, "micrometres read as millimetres"),
+    UnitReading(1e3, "millimetres read as micrometres"),
+    UnitReading(0.1, "the decimal point one place off, or tenths of a micrometre (`0.1um`) read as micrometres"),
+    UnitReading(10.0, "the decimal point one place off, or centimetres read as millimetres"),
+    UnitReading(1e-4, "tenths of a micrometre read as millimetres"),
+    UnitReading(INCH, "inches read as millimetres"),
+    UnitReading(1e-2, "the decimal point two places off, or hundredths of a millimetre read as millimetres"),
+    UnitReading(1e2, "the decimal point two places off"),
+)
+
+
 def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> UnitReading:
     """Find the unit that brings a ratio into the likely range.
 
     Pixels first, then the reading that brings it nearest to the middle of the range; factor 1 when none does. Of a
     pixel of about a micrometre, as one whose size nobody knows is taken, micrometres are no other reading.
     """
-    pixels = (
-        []
-        if pixel_size is None
-        else [
-            (pixel_size, "pixels read as millimetres"),
-            (pixel_size * 1e3, "pixels read as micrometres"),
-            (1 / pixel_size, "millimetres read as pixels"),
-        ]
-    )
-    fits = [
-        UnitReading(factor, name)
-        for factor, name in pixels
-        if likely[0] < ratio * factor < LIKELY_PIXELS and abs(factor - 1.0) > SAME_UNIT
+    size = pixel_size or np.nan
+    pixels = [
+        UnitReading(size, "pixels read as millimetres"),
+        UnitReading(size * 1e3, "pixels read as micrometres"),
+        UnitReading(1 / size, "millimetres read as pixels"),
     ]
-    middle = sum(likely) / 2.0
-    likely_ones = [UnitReading(factor, name) for factor, name in READINGS if likely[0] < ratio * factor < likely[1]]
-    fits += sorted(likely_ones, key=lambda each: abs(math.log(ratio * each.factor / middle)))
-    return fits[0] if fits else UnitReading(1.0, "")
+    for each in pixels:
+        if likely[0] < ratio * each.factor < LIKELY_PIXELS and abs(each.factor - 1.0) > SAME_UNIT:
+            return each
+    middle, others = sum(likely) / 2.0, [each for each in READINGS if likely[0] < ratio * each.factor < likely[1]]
+    nearest_first = sorted(others, key=lambda each: abs(math.log(ratio * each.factor / middle)))
+    return next(iter(nearest_first), UnitReading(1.0, ""))
 
 
 class _Reach(NamedTuple):
@@ -103,19 +99,16 @@ class _Reach(NamedTuple):
     about_middle: float  # how far they reach from there
 
 
-def _scaled(observations: PhotoPoints, cameras: Mapping[str, Camera], camera: Camera) -> tuple[Floats, Numbers]:
-    """Image points of a camera in those units (m, 2), and their photos (m,).
+def _scaled(xy: Floats, camera: Camera) -> Floats:
+    """Image points of a camera (m, 2), mm, in those units.
 
     The photos of a strip may lie crosswise in the comparator: then the sides of the format are exchanged.
     """
-    of_camera = [photo in cameras and cameras[photo].name == camera.name for photo in observations.photo_ids]
-    rows = np.array(of_camera, bool)[observations.photo]
-    xy = observations.xy[rows]
     half = np.full(2, camera.principal_distance) if camera.format is None else np.array(camera.format) / 2.0
     either = [xy / half, xy / half[::-1]]
-    reach = [np.quantile(np.abs(each).max(axis=1), REACH_SHARE) if len(xy) else 0.0 for each in either]
+    reach = [np.quantile(np.abs(each).max(axis=1), REACH_SHARE) for each in either]
     crosswise = reach[0] > REACH[1] >= reach[1]
-    return either[1 if crosswise else 0], observations.photo[rows]
+    return either[1 if crosswise else 0]
 
 
 def _reach(observations: PhotoPoints, scaled: Floats, photo: Numbers) -> _Reach:
@@ -149,10 +142,11 @@ def find_wrong_units(
         known = camera.format is not None
         low, high = REACH if known else REACH_OF_DISTANCE
         factors[name] = 1.0
-        scaled, photo = _scaled(observations, cameras, camera)
-        if not len(scaled):
+        shown = np.array([photo in cameras and cameras[photo].name == name for photo in observations.photo_ids], bool)
+        rows = shown[observations.photo]
+        if not rows.any():
             continue
-        reach = _reach(observations, scaled, photo)
+        reach = _reach(observations, _scaled(observations.xy[rows], camera), observations.photo[rows])
         if low < reach.whole < high:
             if camera.unit == "px" and reach.about_middle < low:  # at a corner: millimetres, perhaps
                 findings.append(_wrong_unit(camera, reach.about_middle, UnitReading(1.0, ""), list(reach.of_photo)))
@@ -160,7 +154,7 @@ def find_wrong_units(
         odd = [photo for photo, own in reach.of_photo.items() if not low < own < high]
         if 0 < len(odd) <= FEW_SHARE * len(reach.of_photo):
             findings.append(_odd_photos(camera, odd, reach))
-        elif (size := _reached(camera, observations, cameras)) is not None:
+        elif (size := _reached(camera, observations.xy[rows])) is not None:
             findings.append(_other_size(camera, size, list(reach.of_photo)))
         elif reach.whole > high and low < reach.about_middle < high:
             findings.append(_other_origin(camera, reach))
@@ -214,15 +208,14 @@ def _other_origin(camera: Camera, reach: _Reach) -> Finding:
     return found("P101", message, fix, evidence, photos=list(reach.of_photo), key=key)
 
 
-def _reached(camera: Camera, observations: PhotoPoints, cameras: Mapping[str, Camera]) -> Floats | None:
+def _reached(camera: Camera, xy: Floats) -> Floats | None:
     """Return how far points reach that are counted from the corner of a larger photo (2,), pixels from that corner.
 
-    None for other points, and for cameras that are not given in pixels.
+    xy: (m, 2), image points of the camera, mm. None for other points, and for cameras that are not given in pixels.
     """
     if camera.unit != "px" or camera.format is None:
         return None
-    of_camera = [photo in cameras and cameras[photo].name == camera.name for photo in observations.photo_ids]
-    xy = observations.xy[np.array(of_camera, bool)[observations.photo]] * [1.0, -1.0] + np.array(camera.format) / 2.0
+    xy = xy * [1.0, -1.0] + np.array(camera.format) / 2.0
     from_corner = np.quantile(xy, 1.0 - REACH_SHARE, axis=0), np.quantile(xy, REACH_SHARE, axis=0)
     beyond = (from_corner[1] > camera.format).any()
     beyond &= (from_corner[1] < MOST_SIZES * np.array(camera.format)).all()  # farther away it is another unit

@@ -26,14 +26,7 @@ from photostrip.notes import Document, Finding, Note, counted, listed
 from photostrip.pipeline import gate
 from photostrip.pipeline.frames import orient_interior
 from photostrip.pipeline.given_cameras import over_control
-from photostrip.pipeline.inputs import (
-    BUNDLE,
-    Inputs,
-    MeasuredModels,
-    require_measured,
-    require_named,
-    require_whole,
-)
+from photostrip.pipeline.inputs import BUNDLE, Inputs, MeasuredModels, require_measured, require_named, require_whole
 from photostrip.points import locate
 from photostrip.project.loading import Project, read_project
 from photostrip.project.reading import fault_at, key_path

@@ -10,16 +10,7 @@ from typing import Annotated, Any, TypeVar
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.faults import LARGEST_NUMBER
 from photostrip.project.reading import read_keys
-from photostrip.project.sections import (
-    Flag,
-    NotNegative,
-    Range,
-    SchemaNumber,
-    Section,
-    Whole,
-    Words,
-    key,
-)
+from photostrip.project.sections import Flag, NotNegative, Range, SchemaNumber, Section, Whole, Words, key
 
 USUAL = Tolerances()
 T = TypeVar("T", bound=Section)

@@ -6,15 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.parts import DASH, Facts, Part, Words
-from photostrip.report.page.tables import (
-    LEAST_PROBABILITY,
-    angle_unit,
-    fixed,
-    keyed,
-    metres,
-    micrometres,
-    short,
-)
+from photostrip.report.page.tables import LEAST_PROBABILITY, angle_unit, fixed, keyed, metres, micrometres, short
 
 UNKNOWN_PIXEL = 0.001  # mm: what stands in a result for a pixel whose size nobody states
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
