@@ -109,10 +109,11 @@ def true_pairs(
     tilt_deg: float = 5.0,
     kappa_deg: float = 180.0,
     relief: float = 0.1,
+    reach: float = 0.6,
     sigma: float = 0.0,
 ) -> TruePairs:
     """Random pairs: both photos tilted and turned, ground with relief, standard points scattered by a tenth."""
-    a = b = 0.6 * focal
+    a = b = reach * focal
     standard = np.array([[0, 0], [b, 0], [0, a], [b, a], [0, -a], [b, -a]], float)
     nadir = np.repeat(standard, counts, axis=0) + rng.uniform(-0.1 * a, 0.1 * a, (pairs, sum(counts), 2))
     depth = focal * (1 + rng.uniform(-relief, relief, nadir.shape[:2]))

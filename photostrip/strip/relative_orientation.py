@@ -165,7 +165,7 @@ HOPELESS = (12, 0.01)  # steps after which a step in rad is too long: those that
 LARGEST_STEP = 0.5  # rad; a longer step is shortened, far starts swing otherwise
 RIDGE = 1e-13  # relative; keeps a singular pair from stopping the batch, changes no digit of a regular one
 RETRY_AZIMUTHS = np.radians([15, -15, 30, -30, 60, -60, 90, -90, 180])
-RETRY_RMS = 1e-3  # of the principal distance: a larger rms y parallax is a false minimum or a gross error
+RETRY_RMS = 1e-3  # of the base in the photo: a larger rms y parallax is a false minimum or a gross error
 
 
 class Solved(NamedTuple):
@@ -267,10 +267,16 @@ def gauss_newton_steps(line: Linearised, pairs: Pairs, ridge: float, longest: fl
 
 def start_values(pairs: Pairs) -> Floats:
     """Elements (0, kappa0, 0, 0, kappa0) that turn both photos so that the mean parallax runs along x."""
-    mean = pairs.sums(((pairs.left - pairs.right) * pairs.weight[:, None]).T)
+    x, y = _base_in_photo(pairs)
     start = np.zeros((pairs.size, 5))
-    start[:, 1] = start[:, 4] = -np.arctan2(mean[1], mean[0])
+    start[:, 1] = start[:, 4] = -np.arctan2(y, x)
     return start
+
+
+def _base_in_photo(pairs: Pairs) -> Floats:
+    """Mean parallaxes (2, p) of pairs as they were measured, along x and y of the photos, mm."""
+    parallax = ((pairs.left - pairs.right) * pairs.weight[:, None]).T
+    return np.asarray(pairs.sums(parallax) / np.maximum(pairs.sums(pairs.weight), 1e-300))
 
 
 def iterate_elements(
@@ -331,15 +337,15 @@ def solve_elements(pairs: Pairs) -> Solved:
     """Elements of all pairs from nothing: start values, iteration, retries from other azimuths.
 
     A pair is tried again with its start azimuth turned by 15 to 180 degrees when it does not converge, a point comes
-    out behind a camera, or the y parallaxes stay large: with tilts beyond 10 degrees there are false minima with all
-    points in front. Of the solutions found, the one with most points in front and then the smallest sum of squares is
-    taken.
+    out behind a camera, or the y parallaxes stay large: with tilts beyond 10 degrees, in a narrow field beyond 2, there
+    are false minima with all points in front. Of the solutions found, the one with most points in front and then the
+    smallest sum of squares is taken.
     """
     start = start_values(pairs)
     best, converged, steps = iterate_elements(start, pairs)
     best, rays = facing(best, pairs)
     share, squares = _score(rays, converged, pairs)
-    tolerable = (RETRY_RMS * pairs.focal) ** 2 * pairs.sums(pairs.weight)
+    tolerable = RETRY_RMS**2 * np.square(_base_in_photo(pairs)).sum(axis=0) * pairs.sums(pairs.weight)
     for turn in RETRY_AZIMUTHS:
         todo = np.flatnonzero((share < 1) | (squares > tolerable))
         if not len(todo):

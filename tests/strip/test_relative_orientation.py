@@ -190,9 +190,12 @@ def test_derivatives_are_differences(seed: int, elements: tuple[float, ...]) -> 
         assert np.allclose(jacobian[number], difference, rtol=1e-5, atol=1e-5 * np.abs(jacobian[number]).max() + 1e-4)
 
 
-@pytest.mark.parametrize("tilt", [2.0, 5.0, 10.0])
-def test_pairs_of_any_kappa_come_back_to_the_truth(tilt: float) -> None:
-    truth = true_pairs(np.random.default_rng(1), 1000, tilt_deg=tilt)
+@pytest.mark.parametrize(
+    ("tilt", "reach", "relief"), [(2.0, 0.6, 0.1), (5.0, 0.6, 0.1), (10.0, 0.6, 0.1), (4.0, 0.1, 0.02)]
+)
+def test_pairs_of_any_kappa_come_back_to_the_truth(tilt: float, reach: float, relief: float) -> None:
+    """In a narrow field, too, where false minima leave small parallaxes."""
+    truth = true_pairs(np.random.default_rng(1), 1000, tilt_deg=tilt, reach=reach, relief=relief)
     elements, converged, iterations = solve_elements(truth.pairs)
     assert converged.all()
     assert np.count_nonzero(truth.errors(elements) > 1e-10) == 0
