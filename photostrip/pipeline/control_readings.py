@@ -109,6 +109,7 @@ DISTANCE = Reading("P105", "", "", distance=np.nan)  # which is estimated
 MIRRORED = Reading("P401", "", "", mirrored=True)  # of several causes, which fit alike
 EXCHANGED = (1, 0, 2)  # columns of the plan
 PLAN_EXCHANGED = _columns(*EXCHANGED)
+OF_POSITIONS = "camera positions lie over it only so"
 READINGS = (
     MIRRORED,
     PLAN_EXCHANGED,  # which degrees, and places with another map scale, tell from a mirror image
@@ -343,20 +344,24 @@ def of_mirrored(
     if with_positions and inputs.positions is not None:
         axes_of["camera_positions"] = inputs.positions.frame.axes
     hands = {round(float(np.linalg.det(np.eye(3)[_places(axes)]))) for axes in axes_of.values()}
-    causes, told = _of_photos([strip for strip in inputs.strips if strip.id in strips], inputs)
-    why = "camera positions lie over it only so" if with_positions is False else ""
-    if why:
-        causes, told = {}, False
-    right = "lists of both hands agree" if len(hands) > 1 else ""
-    right = "other strips fit it as it is" if others_fit else "it lies where its crs is" if in_place else right
-    by_control = not (right or told)
+    of_strips = [strip for strip in inputs.strips if strip.id in strips]
+    by_positions = with_positions is False
+    causes, by_format = (dict[str, str](), False) if by_positions else _of_photos(of_strips, inputs)
+    reasons = {
+        "their format holds the points only so": by_format,
+        "the control is right: other strips fit it as it is": others_fit,
+        "the control is right: it lies where its crs is": in_place,
+        "the control is right: lists of both hands agree": len(hands) > 1,
+        OF_POSITIONS: by_positions,
+    }
+    why = next((reason for reason, holds in reasons.items() if holds), "")
+    by_control = why in {"", OF_POSITIONS}
     if by_control:
         two = "two of X, Y, Z" if "x" in frames[lists[0]].axes else "east and north"
         of_both = " and of the camera positions" if with_positions else ""
-        backwards = ", or one of them counts backwards" if frames[lists[0]].kind == "local" and not why else ""
+        backwards = ", or one of them counts backwards" if frames[lists[0]].kind == "local" and not by_positions else ""
         causes = {f"{two} of the control{of_both} are exchanged{backwards}": axes_to_write(axes_of, EXCHANGED)} | causes
     head = f"strips {listed(strips)} are mirrored: " if len(strips) > 1 else ""
-    why = "their format holds the points only so" if told else f"the control is right: {right}" if right else why
     message = f"{head}{findings[0].message}: {', or '.join(causes)}{why and f' ({why})'}"
     fix = f"write {', or '.join(causes.values())}" + ("; all fit alike" if len(causes) > 1 else "")
     if others_fit:

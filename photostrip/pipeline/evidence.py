@@ -1,19 +1,14 @@
-"""What the checks look at: strips formed for evidence.
+"""What the checks look at: strips formed for evidence, what images say, a strip on its control however that is read.
 
-Directions of bases by relative orientation, where the photos laid side by side leave their order in doubt.
+**Directions of bases**, where the photos laid side by side leave their order in doubt: on a photo, a tilt moves the
+points of its neighbour as a base does; with an end lap of 80 % and a long lens a tilt of 5 degrees is as large as half
+a base. The layout of the photos is a cheap screen; what it speaks against is looked at with the pair oriented, which
+keeps base and tilt apart.
 
-On a photo, a tilt moves the points of its neighbour as a base does: with an end lap of 80 % and a long lens a tilt of
-5 degrees is as large as half a base. The layout of the photos is a cheap screen; what it speaks against is looked at
-with the pair oriented, which keeps base and tilt apart.
-
-What the image coordinates alone say: units, mirror images, the order of the photos.
-
-A formed strip on its control, however that is read: what it predicts of each coordinate, and how well.
-
-The errors of a strip by those of its image coordinates are known, all of them together, so that a strip which bends as
-they let it contradicts nothing. Under each reading the strip is laid on its control by a similarity, and what no other
-control predicts is taken out, as a run with polynomials does (``control_screening``). Points far away from all others
-are predicted and take no part.
+**A strip on its control**: the errors of a strip by those of its image coordinates are known, all of them together, so
+that a strip which bends as they let it contradicts nothing. Under each reading the strip is laid on its control by a
+similarity, and what no other control predicts is taken out, as a run with polynomials does (``control_screening``).
+Points far away from all others are predicted and take no part.
 """
 
 from __future__ import annotations
