@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -90,13 +91,24 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
     return next(iter(nearest_first), UnitReading(1.0, ""))
 
 
-class _Reach(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Reach:
     """How far image points reach, in units of half the format, or of the principal distance without a format."""
 
+    size: Floats  # (m,): of each image point
+    photo: Numbers  # (m,): number of its photo
+    photo_ids: Sequence[str]
     whole: float  # of all photos of a camera
-    of_photo: dict[str, float]
     middle: Floats  # (2,): middle of what they cover
     about_middle: float  # how far they reach from there
+
+    @cached_property
+    def of_photo(self) -> dict[str, float]:
+        """Of each photo, which is asked only where something is wrong."""
+        return {
+            self.photo_ids[number]: float(np.quantile(self.size[self.photo == number], REACH_SHARE))
+            for number in np.unique(self.photo).tolist()
+        }
 
 
 def _scaled(xy: Floats, camera: Camera) -> Floats:
@@ -112,16 +124,15 @@ def _scaled(xy: Floats, camera: Camera) -> Floats:
 
 
 def _reach(observations: PhotoPoints, scaled: Floats, photo: Numbers) -> _Reach:
-    """Measure how far image points of a camera reach, photo by photo and from their own middle."""
+    """Measure how far image points of a camera reach, and from their own middle."""
     size = np.abs(scaled).max(axis=1)
     ends = [[np.quantile(each, share) for each in scaled.T] for share in (1.0 - REACH_SHARE, REACH_SHARE)]
     middle = np.mean(ends, axis=0)
     return _Reach(
+        size=size,
+        photo=photo,
+        photo_ids=observations.photo_ids,
         whole=np.quantile(size, REACH_SHARE),
-        of_photo={
-            observations.photo_ids[number]: np.quantile(size[photo == number], REACH_SHARE)
-            for number in np.unique(photo).tolist()
-        },
         middle=middle,
         about_middle=np.quantile(np.abs(scaled - middle).max(axis=1), REACH_SHARE),
     )
