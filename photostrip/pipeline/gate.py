@@ -45,6 +45,7 @@ ALIKE = "P410"  # coordinates that are those of others
 OUTSIDE = "P402"  # control lies outside its coordinate reference system: what a map stretches there no camera did
 OF_HEIGHTS = (BELOW, "P205")  # findings on heights of camera positions above the control
 PAIR = 2  # photos
+OF_NEIGHBOURS = ("P205", "P206", "P207")  # findings on a photo, or on two, beside those next to it
 OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
 OF_CAMERAS = ("P105", "P107", "P110", "P111", "P112")  # findings on cameras: control that is misread looks like it
 
@@ -204,6 +205,12 @@ def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tu
     turned = {strip for each in findings if each.code in OF_HANDS for strip in each.strips}
     told = (each for each in findings if found.isdisjoint(each.strips) or each.code not in OF_STRIPS)
     told = (each for each in told if each.code not in silent)
+    mixed = {strip for each in findings if each.code == OUT_OF_ORDER for strip in each.strips}  # who is next to whom
+    told = (
+        each
+        for each in told
+        if each.code not in OF_NEIGHBOURS or len(each.photos) > PAIR or mixed.isdisjoint(each.strips)
+    )
     told = (each for each in told if each.code != BELOW or each.key or turned.isdisjoint(each.strips))
     if any(each.is_error and each.key.startswith("control") for each in findings):  # heights above it say nothing
         told = (each for each in told if each.code not in OF_HEIGHTS or not each.key.startswith(CAMERAS))
