@@ -35,9 +35,8 @@ class Camera:
     # b1, b2: how pixels of x depart from squares: u = (1 + b1) x + b2 y, of measured u and x, y in the image
     pixel_affinity: tuple[float, float] = (0.0, 0.0)
     distortion: Distortion | None = None
-    unit: str = (
-        "mm"  # of what the project says of it; ``"px"``: a camera in pixels, perhaps of a size that nobody knows
-    )
+    # of what the project says of it: ``"px"`` is a camera in pixels, perhaps of a size that nobody knows
+    unit: str = "mm"
 
     @property
     def distance_key(self) -> str:

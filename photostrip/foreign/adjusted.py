@@ -147,16 +147,13 @@ class Adjusted:
         column = {each.title: number for number, each in enumerate(CALIBRATION.values())}
         for each in self._calibration:
             estimated[each["camera"]][column[each["parameter"]]] = each["value"]
-        given = {each["id"]: each for each in self.document["cameras"]}
         names = dict(zip(self.camera_of, self.given_camera_of, strict=True))
+        own = {name: name.removeprefix(f"{like} ") if name != like else "" for name, like in names.items()}
         return {
-            name: _in_file(
-                _camera(given[like] | {"id": name}),
-                estimated[like] + estimated[name.removeprefix(f"{like} ") if name != like else ""],
-                self._edge(name),
-            )
-            for name, like in sorted(names.items(), key=lambda pair: list(given).index(pair[1]))
-            if like in given
+            name: _in_file(_camera(each | {"id": name}), estimated[like] + estimated[own[name]], self._edge(name))
+            for each in self.document["cameras"]
+            for name, like in names.items()
+            if like == each["id"]
         }
 
     def _edge(self, camera: str) -> Floats:

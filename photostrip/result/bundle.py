@@ -42,16 +42,12 @@ class GroupKind(NamedTuple):
 
 def kinds(angle_unit: str, *, of_models: bool = False) -> dict[str, GroupKind]:
     """Return how observations are written, with angles in the unit of the output; rays or model coordinates first."""
-    measured = GroupKind(name="model", axes=CARTESIAN_AXES, unit="um", factor=MICROMETRES)
+    measured = ("model", CARTESIAN_AXES) if of_models else ("image", ("x", "y"))
     return {
-        reliability.IMAGE: measured
-        if of_models
-        else GroupKind(name="image", axes=("x", "y"), unit="um", factor=MICROMETRES),
-        reliability.CONTROL: GroupKind(name="control", axes=GROUND_AXES, unit="m", factor=1.0),
-        reliability.POSITION: GroupKind(name="position", axes=GROUND_AXES, unit="m", factor=1.0),
-        reliability.ATTITUDE: GroupKind(
-            name="attitude", axes=("1", "2", "3"), unit=angle_unit, factor=PER_RADIAN[angle_unit]
-        ),
+        reliability.IMAGE: GroupKind(*measured, "um", MICROMETRES),
+        reliability.CONTROL: GroupKind("control", GROUND_AXES, "m", 1.0),
+        reliability.POSITION: GroupKind("position", GROUND_AXES, "m", 1.0),
+        reliability.ATTITUDE: GroupKind("attitude", ("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
     }
 
 
