@@ -149,16 +149,25 @@ def screen_bundle(
     except GeometryError:
         return done
     unit = max(min(done.solution.sigma0, without.solution.sigma0), 1.0)
-    return min(done, without, key=lambda each: _left_and_explained(each, unit, settings.level))
+    of_photos = any(each.kind in OF_PHOTOS for each in done.common)
+    cost, cost_without = (_left_and_explained(each, unit, settings.level, whole=of_photos) for each in (done, without))
+    if of_photos and not any(each.kind in OF_PHOTOS for each in without.common):
+        # over level ground a wrong position of a photo looks like another lens, or other marks, and nothing tells them
+        # apart: what one given point or position explains is not laid on all that a photo shows
+        cost -= 2.0 * log(settings.level)
+    return done if cost <= cost_without else without
 
 
-def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> float:
-    """Sum of squares that is left, and what each cause that was found must have explained to be found."""
+def _left_and_explained(done: ScreenedBundle, unit: float, level: float, *, whole: bool) -> float:
+    """Sum of squares that is left, and what each cause that was found must have explained to be found.
+
+    whole: whether a given point or position is one cause, as a photo is, and not each of its coordinates.
+    """
     observations = done.problem
     photos = sum(each.kind in OF_PHOTOS for each in done.common)
     given = int(sum(np.isfinite(each.sigma).sum() for each in (observations.control, observations.positions)))
     rays_out = sum(each.kind == IMAGE for each in done.out)
-    given_out = len(done.out) - rays_out
+    given_out = len({(each.kind, each.row, () if whole else each.axes) for each in done.out if each.kind != IMAGE})
     asked = rays_out, given_out, photos, len(done.common) - photos
     numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
     price = 2.0 * xlogy(asked, np.array(numbers) / level).sum()  # of nothing that is asked of nothing: 0

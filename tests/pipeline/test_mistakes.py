@@ -274,8 +274,7 @@ def test_a_shifted_photo_is_named_with_its_shift(
     settings = replace(case.settings, adjustment="bundle", bundle=bundle)
     (finding,) = (each for each in triangulate(inputs, settings).findings if each.code == "P109")
     assert set(finding.photos) == ids
-    found = [float(finding.evidence[f"shift_{axis}_mm"]) for axis in "xy"]
-    assert found == pytest.approx(shift, abs=0.8)
+    assert [float(finding.evidence[f"shift_{axis}_mm"]) for axis in "xy"] == pytest.approx(shift, abs=0.8)
 
 
 def test_a_reduced_photo_is_named_with_its_scale() -> None:
@@ -286,12 +285,14 @@ def test_a_reduced_photo_is_named_with_its_scale() -> None:
     assert finding.evidence["scale"] == pytest.approx(1.0 / 1.5, abs=0.01)
 
 
-def test_a_camera_position_may_be_wrong_where_a_photo_seems_to_be_shifted() -> None:
+@pytest.mark.parametrize("off", [[3.0, 2.0, 0.0], [0.0, 0.0, 3.6]])
+def test_a_wrong_camera_position_is_laid_on_no_photo(off: list[float]) -> None:
     made, one = simulate(Spec(seed=20, flight=Flight(photos=6), gnss=Gnss())), np.ones((6, 3))
-    given = np.asarray(made.gnss) + np.eye(6)[2][:, None] * [3.0, 2.0, 0.0]
+    given = np.asarray(made.gnss) + np.eye(6)[2][:, None] * off
     positions = CameraPositions(made.truth.photo_ids, made.frames[0], given, one > 0, 0.1 * one, one[:, 0])
-    (finding,) = findings_of(replace(inputs_of(made), positions=positions))
-    assert (finding.code, finding.photos, "camera position wrong" in finding.fix) == ("P109", ("1003",), True)
+    result = triangulate(replace(inputs_of(made), positions=positions), Settings())
+    assert result.bundle is not None
+    assert (result.findings, {(each.kind, each.row) for each in result.bundle.screened.out}) == ((), {("position", 2)})
 
 
 def test_every_kind_of_mistake_is_planted_in_the_benchmark() -> None:
